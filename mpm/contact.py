@@ -1,0 +1,221 @@
+"""Node equations of both phases with implicit drag, box boundaries and contact with the lining.
+
+Per node the unknown velocities solve, each component on its own,
+    (M_l + dt D) v_l' - dt D v_s' = M_l v_l + dt F_l + dt R_l
+    M_s v_s' + M_nl v_l'          = M_s v_s + M_nl v_l + dt F_mix + dt (R_l + R_s)
+with the reactions R of an impermeable, rough, unilateral wall: for each phase either the normal
+velocity is zero and the reaction pushes, or there is no reaction and the phase leaves the wall.
+As a linear complementarity problem its matrix has positive principal minors, so exactly one of
+the four cases holds. Drag is implicit: no permeability limits the time step.
+"""
+
+from mpm.jit import inline_kernel, kernel
+from mpm.variables import (
+    B_D,
+    B_FLX,
+    B_FLY,
+    B_FX,
+    B_FY,
+    B_ML,
+    B_MN,
+    B_MS,
+    B_PLX,
+    B_PLY,
+    B_PSX,
+    B_PSY,
+    B_Q,
+    V_DLX,
+    V_DLY,
+    V_DSX,
+    V_DSY,
+    V_LX,
+    V_LY,
+    V_ML,
+    V_MS,
+    V_P,
+    V_SX,
+    V_SY,
+    V_TL,
+    V_TS,
+)
+
+FIXED_X, FIXED_Y = 1, 2
+SOLID_HELD, SOLID_STICKS, LIQUID_HELD = 1, 2, 4
+
+
+@inline_kernel
+def free_pair(b_s, b_l, ms, ml, mn, d):
+    """Velocities (solid, liquid) of one component without reactions; d = dt D."""
+    vs = (b_s - mn * b_l / (ml + d)) / (ms + mn * d / (ml + d))
+    return vs, (b_l + d * vs) / (ml + d)
+
+
+@kernel
+def wall_normal(b_s, b_l, ms, ml, mn, d, dt):
+    """Normal velocities (solid, liquid) and reactions (effective, water) at a wall [N per metre]."""
+    r_l = -b_l / dt
+    r_s = -b_s / dt - r_l
+    if r_l >= 0.0 and r_s >= 0.0:
+        return 0.0, 0.0, r_s, r_l
+    vs = (b_s - b_l) / (ms + d)  # grains leave, water is held
+    r_l = -(d * vs + b_l) / dt
+    if vs >= 0.0 and r_l >= 0.0:
+        return vs, 0.0, 0.0, r_l
+    vl = b_l / (ml + d)  # water leaves, grains are held
+    r_s = (mn * vl - b_s) / dt
+    if vl >= 0.0 and r_s >= 0.0:
+        return 0.0, vl, r_s, 0.0
+    vs, vl = free_pair(b_s, b_l, ms, ml, mn, d)
+    return vs, vl, 0.0, 0.0
+
+
+@kernel
+def solve_nodes(
+    first, last, sums, dt, gravity, density_liquid, fixed, contact_of_node,
+    normal, active, friction, nodes, status, impulse,
+):  # fmt: skip
+    """Add up the parts of a range of nodes and advance both phases by dt.
+
+    Parameters
+    ----------
+    sums : (n_parts, n_nodes, 13) float64
+        What the parts of the mesh add to the nodes; added in the order of the parts.
+    fixed, status : (n_nodes,) int8
+        Box boundary bits; written: which constraints acted.
+    contact_of_node : (n_nodes,) int32
+        Row of the contact arrays or -1.
+    normal, active, friction : (n_contact, 2), (n_contact,), (n_contact,)
+        Into the material; whether the wall is there; Coulomb coefficient [-].
+    nodes : (n_nodes, 13) float64
+        Written: new velocities, increments, masses, pressure projection.
+    impulse : (n_contact, 5) float64
+        Added: dt times effective normal, water normal, tangential reaction [N s/m], the latter along
+        (ny, -nx) on the material, and dt times the squares of the first two.
+    """
+    for i in range(first, last):
+        ms = ml = mn = dd = psx = psy = plx = ply = q = fx = fy = flx = fly = 0.0
+        for part in range(sums.shape[0]):
+            b = sums[part, i]
+            ms += b[B_MS]
+            ml += b[B_ML]
+            mn += b[B_MN]
+            dd += b[B_D]
+            psx += b[B_PSX]
+            psy += b[B_PSY]
+            plx += b[B_PLX]
+            ply += b[B_PLY]
+            q += b[B_Q]
+            fx += b[B_FX]
+            fy += b[B_FY]
+            flx += b[B_FLX]
+            fly += b[B_FLY]
+        row = nodes[i]
+        row[V_MS] = ms
+        row[V_ML] = ml
+        status[i] = 0
+        if ms <= 0.0 or ml <= 0.0:
+            row[V_MS] = 0.0
+            row[V_P] = 0.0
+            row[V_SX] = row[V_SY] = row[V_LX] = row[V_LY] = 0.0
+            row[V_DSX] = row[V_DSY] = row[V_DLX] = row[V_DLY] = 0.0
+            continue
+        row[V_P] += q * density_liquid / ml
+        fy -= (ms + mn) * gravity
+        fly -= ml * gravity
+        ux, uy, wx, wy = psx / ms, psy / ms, plx / ml, ply / ml
+        bsx = psx + mn * wx + dt * fx
+        bsy = psy + mn * wy + dt * fy
+        blx = plx + dt * flx
+        bly = ply + dt * fly
+        d = dt * dd
+        c = contact_of_node[i]
+        if c >= 0 and active[c]:
+            nx, ny = normal[c, 0], normal[c, 1]
+            bsn, bln = nx * bsx + ny * bsy, nx * blx + ny * bly
+            bst, blt = ny * bsx - nx * bsy, ny * blx - nx * bly
+            vsn, vln, r_s, r_l = wall_normal(bsn, bln, ms, ml, mn, d, dt)
+            shear = 0.0
+            if r_s > 0.0:
+                vlt = blt / (ml + d)
+                vst = 0.0
+                shear = (mn * vlt - bst) / dt
+                limit = friction[c] * r_s
+                if abs(shear) > limit:
+                    shear = limit if shear > 0.0 else -limit
+                    vst, vlt = free_pair(bst + dt * shear, blt, ms, ml, mn, d)
+                else:
+                    status[i] |= SOLID_STICKS
+                status[i] |= SOLID_HELD
+            else:
+                vst, vlt = free_pair(bst, blt, ms, ml, mn, d)
+            if r_l > 0.0:
+                status[i] |= LIQUID_HELD
+            vsx, vsy = nx * vsn + ny * vst, ny * vsn - nx * vst
+            vlx, vly = nx * vln + ny * vlt, ny * vln - nx * vlt
+            impulse[c, 0] += dt * r_s
+            impulse[c, 1] += dt * r_l
+            impulse[c, 2] += dt * shear
+            impulse[c, 3] += dt * r_s * r_s
+            impulse[c, 4] += dt * r_l * r_l
+        else:
+            vsx, vlx = free_pair(bsx, blx, ms, ml, mn, d)
+            vsy, vly = free_pair(bsy, bly, ms, ml, mn, d)
+        if fixed[i] & FIXED_X:
+            vsx = vlx = 0.0
+        if fixed[i] & FIXED_Y:
+            vsy = vly = 0.0
+        row[V_SX], row[V_SY], row[V_LX], row[V_LY] = vsx, vsy, vlx, vly
+        row[V_DSX], row[V_DSY] = vsx - ux, vsy - uy
+        row[V_DLX], row[V_DLY] = vlx - wx, vly - wy
+
+
+@kernel
+def remap_nodes(first, last, momenta, fixed, contact_of_node, normal, active, nodes, status):
+    """Nodal velocities from the updated point momenta (MUSL), under the constraints that acted in this step."""
+    for i in range(first, last):
+        row = nodes[i]
+        if row[V_MS] <= 0.0:
+            continue
+        sx = sy = lx = ly = 0.0
+        for part in range(momenta.shape[0]):
+            sx += momenta[part, i, 0]
+            sy += momenta[part, i, 1]
+            lx += momenta[part, i, 2]
+            ly += momenta[part, i, 3]
+        sx /= row[V_MS]
+        sy /= row[V_MS]
+        lx /= row[V_ML]
+        ly /= row[V_ML]
+        c = contact_of_node[i]
+        if c >= 0 and active[c]:
+            nx, ny = normal[c, 0], normal[c, 1]
+            if status[i] & SOLID_STICKS:
+                sx = sy = 0.0
+            else:
+                vn = nx * sx + ny * sy
+                if status[i] & SOLID_HELD or vn < 0.0:
+                    sx -= vn * nx
+                    sy -= vn * ny
+            vn = nx * lx + ny * ly
+            if status[i] & LIQUID_HELD or vn < 0.0:
+                lx -= vn * nx
+                ly -= vn * ny
+        if fixed[i] & FIXED_X:
+            sx = lx = 0.0
+        if fixed[i] & FIXED_Y:
+            sy = ly = 0.0
+        row[V_SX], row[V_SY], row[V_LX], row[V_LY] = sx, sy, lx, ly
+
+
+@kernel
+def smooth_rates(first, last, sums, nodes):
+    """Nodal means of both divergences, weighted by material volume (Detournay & Dzik 2006)."""
+    for i in range(first, last):
+        weight = ts = tl = 0.0
+        for part in range(sums.shape[0]):
+            weight += sums[part, i, 0]
+            ts += sums[part, i, 1]
+            tl += sums[part, i, 2]
+        if weight > 0.0:
+            nodes[i, V_TS] = ts / weight
+            nodes[i, V_TL] = tl / weight

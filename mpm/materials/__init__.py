@@ -1,0 +1,1 @@
+"""Constitutive laws: pure functions of a stress and a strain increment."""

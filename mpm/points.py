@@ -1,0 +1,218 @@
+"""Filling elements with points, and keeping points with the element that holds them."""
+
+import math
+
+import numpy as np
+
+from mpm.jit import kernel
+from mpm.variables import MASS, POINT_WIDTH, SXX, SYY, SZZ, X0, Y0, C_RETURNED, N, P, X, Y
+
+
+def barycentric_layout(count):
+    """Barycentric coordinates of equally weighted points with their centroid at the element's.
+
+    Parameters
+    ----------
+    count : int
+        Points per element: k^2 or 3 k^2 (the element divided into k^2 similar ones with one or
+        three points each), or 6.
+
+    Returns
+    -------
+    (count, 3) float64
+        A stress field linear in space is integrated exactly by these points with equal weights.
+
+    Raises
+    ------
+    ValueError
+        For a count that has no such layout.
+    """
+    if count == 6:
+        a = np.array([0.091576213509771, 0.445948490915965])
+        return np.array([np.roll([1 - 2 * s, s, s], k) for s in a for k in range(3)])
+    for per, local in ((1, [[1 / 3] * 3]), (3, [[2 / 3, 1 / 6, 1 / 6], [1 / 6, 2 / 3, 1 / 6], [1 / 6, 1 / 6, 2 / 3]])):
+        k = math.isqrt(count // per)
+        if per * k * k == count and k > 0:
+            corners = []
+            for i in range(k):
+                for j in range(k - i):
+                    corners.append([(i, j), (i + 1, j), (i, j + 1)])
+                    if i + j < k - 1:
+                        corners.append([(i + 1, j), (i + 1, j + 1), (i, j + 1)])
+            points = [np.array(b) @ np.array(c) / k for c in corners for b in local]
+            return np.array([[1 - p[0] - p[1], p[0], p[1]] for p in points])
+    raise ValueError(f"points_per_element must be k^2, 3 k^2 or 6, got {count}; use 3, 4, 6 or 12")
+
+
+def fill(mesh, scene):
+    """Place points in the soil elements with the K0 and hydrostatic initial state.
+
+    Parameters
+    ----------
+    mesh : mpm.mesh.Mesh
+    scene : mpm.scene.Scene
+
+    Returns
+    -------
+    points : (n_points, 16) float64
+    element_of_point, soil_of_point : (n_points,) int32
+    """
+    nodes, elements = mesh.nodes, mesh.elements
+    corners = nodes[elements]
+    centre = corners.mean(axis=1)
+    area = _area(corners)
+    soil_elements = np.flatnonzero(mesh.region == 0)
+    tops = np.array([soil.top_depth for soil in scene.soils])
+    soil_of_element = np.searchsorted(tops, -centre[:, 1], side="right") - 1
+    near_gate = np.zeros(len(elements), bool)
+    d = scene.discretisation
+    if scene.gate is not None:
+        tunnel = scene.tunnels[scene.gate.tunnel]
+        angle = math.radians(scene.gate.angle)
+        gate = np.array(
+            [
+                tunnel.x + tunnel.outer_radius * math.sin(angle),
+                -tunnel.axis_depth + tunnel.outer_radius * math.cos(angle),
+            ]
+        )
+        near_gate = np.hypot(*(centre - gate).T) < d.gate_radius
+    parts, owner = [], []
+    for count, chosen in (
+        (d.points_per_element, soil_elements[~near_gate[soil_elements]]),
+        (d.points_per_element_gate, soil_elements[near_gate[soil_elements]]),
+    ):
+        layout = barycentric_layout(count)
+        position = np.einsum("pk,ekd->epd", layout, corners[chosen])
+        rows = np.zeros((len(chosen), count, POINT_WIDTH))
+        rows[:, :, X : Y + 1] = position
+        soil = soil_of_element[chosen]
+        porosity = np.array([s.porosity for s in scene.soils])[soil]
+        density = np.array([s.grain_density for s in scene.soils])[soil]
+        rows[:, :, N] = porosity[:, None]
+        rows[:, :, MASS] = (density * (1 - porosity) * area[chosen] / count)[:, None]
+        parts.append(rows.reshape(-1, POINT_WIDTH))
+        owner.append(np.repeat(chosen, count))
+    points = np.concatenate(parts)
+    element_of_point = np.concatenate(owner).astype(np.int32)
+    by_element = np.argsort(element_of_point, kind="stable")
+    points, element_of_point = np.ascontiguousarray(points[by_element]), element_of_point[by_element]
+    soil_of_point = soil_of_element[element_of_point].astype(np.int32)
+    points[:, X0 : Y0 + 1] = points[:, X : Y + 1]
+    vertical, pressure = initial_stress(scene, -points[:, Y])
+    k0 = np.array([s.k0 for s in scene.soils])[soil_of_point]
+    points[:, P] = pressure
+    points[:, SYY] = -vertical
+    points[:, SXX] = points[:, SZZ] = -k0 * vertical
+    return points, element_of_point, soil_of_point
+
+
+def _area(corners):
+    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+
+
+def initial_stress(scene, depth):
+    """Vertical effective stress and pore pressure of level ground [Pa], compression positive.
+
+    Parameters
+    ----------
+    depth : (n,) float64
+        Depth below the ground surface [m].
+
+    Notes
+    -----
+    The soil is saturated throughout: above the water table its water hangs at zero pressure.
+    """
+    g, water = scene.gravity, scene.water
+    total = np.zeros_like(depth)
+    tops = [s.top_depth for s in scene.soils] + [math.inf]
+    for soil, top, bottom in zip(scene.soils, tops[:-1], tops[1:], strict=True):
+        weight = g * ((1 - soil.porosity) * soil.grain_density + soil.porosity * water.density)
+        total += weight * np.clip(np.minimum(depth, bottom) - top, 0.0, None)
+    pressure = g * water.density * np.clip(depth - water.table_depth, 0.0, None)
+    return total - pressure, pressure
+
+
+@kernel
+def sort_by_element(element_of_point, n_elements, start, order, occupied):
+    """Counting sort: points of element e become order[start[e]:start[e + 1]], in ascending point number.
+
+    Points with a negative element are left out. Returns the number of occupied elements and of points.
+    """
+    for e in range(n_elements + 1):
+        start[e] = 0
+    for i in range(element_of_point.size):
+        if element_of_point[i] >= 0:
+            start[element_of_point[i] + 1] += 1
+    filled = 0
+    for e in range(n_elements):
+        if start[e + 1] > 0:
+            occupied[filled] = e
+            filled += 1
+        start[e + 1] += start[e]
+    for i in range(element_of_point.size):
+        e = element_of_point[i]
+        if e >= 0:
+            order[start[e]] = i
+            start[e] += 1
+    for e in range(n_elements, 0, -1):
+        start[e] = start[e - 1]
+    start[0] = 0
+    return filled, start[n_elements]
+
+
+@kernel
+def relocate(element_of_point, points, geometry, neighbours, clamps):
+    """Find the new element of every point that left its own, walking over neighbours.
+
+    A point that would cross the boundary of the mesh is put back on it (and counted); one that
+    crosses an outflow edge (neighbour -2) is taken out: element -1.
+    """
+    removed = 0
+    for i in range(element_of_point.size):
+        if element_of_point[i] > -2:
+            continue
+        e = -2 - element_of_point[i]
+        for _ in range(10000):
+            g = geometry[e]
+            dx = points[i, X] - g[4]
+            dy = points[i, Y] - g[5]
+            n1 = g[0] * dx + g[1] * dy
+            n2 = g[2] * dx + g[3] * dy
+            n0 = 1.0 - n1 - n2
+            worst = 0
+            low = n0
+            if n1 < low:
+                worst, low = 1, n1
+            if n2 < low:
+                worst, low = 2, n2
+            if low >= 0.0:
+                break
+            following = neighbours[e, worst]
+            if following < 0:
+                # try to leave through the other violated edge first
+                other = -1
+                for k in range(3):
+                    value = n0 if k == 0 else (n1 if k == 1 else n2)
+                    if k != worst and value < 0.0 and neighbours[e, k] >= 0:
+                        other = neighbours[e, k]
+                if other >= 0:
+                    following = other
+            if following >= 0:
+                e = following
+                continue
+            if following == -2:
+                e = -1
+                removed += 1
+                break
+            n0, n1, n2 = max(n0, 1e-9), max(n1, 1e-9), max(n2, 1e-9)
+            total = n0 + n1 + n2
+            n1 /= total
+            n2 /= total
+            det = g[0] * g[3] - g[1] * g[2]
+            points[i, X] = g[4] + (n1 * g[3] - n2 * g[1]) / det
+            points[i, Y] = g[5] + (n2 * g[0] - n1 * g[2]) / det
+            clamps[C_RETURNED] += 1
+            break
+        element_of_point[i] = e
+    return removed

@@ -1,0 +1,286 @@
+"""The validated, immutable description of ground, tunnels, gate, discretisation and stages.
+
+SI units; a string with a unit ("20 kN/m3", "37 deg") is converted. Angles are in degrees, those of
+the lining from the crown, clockwise. The ground surface is y = 0, y points up and x = 0 is the
+middle of the box. Numbers that decide the answer have no default; numerical ones may have one.
+"""
+
+import math
+from functools import cached_property
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+
+
+def quantity(unit):
+    """A float field in `unit` that also takes a string with a unit, converted by pint."""
+
+    def convert(value: Any):
+        if not isinstance(value, str):
+            return value
+        import pint  # loaded only where a scene uses strings with units
+
+        registry = pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
+        try:
+            return registry.Quantity(value.replace("m3", "m**3").replace("m2", "m**2")).to(unit).magnitude
+        except Exception as error:
+            raise ValueError(f"cannot read {value!r} as a quantity in {unit}: {error}") from None
+
+    return Annotated[float, BeforeValidator(convert)]
+
+
+Length, Pressure, Density = quantity("m"), quantity("Pa"), quantity("kg/m**3")
+Angle, Velocity, Time, Mass = quantity("degree"), quantity("m/s"), quantity("s"), quantity("kg/m")
+Acceleration = quantity("m/s**2")
+
+
+class Part(BaseModel):
+    """A part of a scene: immutable, unknown keys refused, infinities and NaN refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Box(Part):
+    """The ground modelled: width and depth below the surface, and empty mesh above it [m]."""
+
+    width: Length = Field(gt=0, le=2000)
+    depth: Length = Field(gt=0, le=2000)
+    headroom: Length | None = Field(default=None, gt=0)
+
+
+class Water(Part):
+    """Pore water; everything below the table is saturated, and so is what hangs above it."""
+
+    table_depth: Length = Field(ge=0)
+    density: Density = Field(gt=500, lt=2000)
+    bulk_modulus: Pressure = Field(ge=1e6, le=1e11)
+
+
+class Soil(Part):
+    """One soil layer, from `top_depth` down to the next layer or the bottom."""
+
+    name: str
+    top_depth: Length = Field(ge=0)
+    model: Literal["mohr-coulomb", "elastic"]
+    youngs_modulus: Pressure = Field(ge=1e4, le=1e11)
+    poissons_ratio: float = Field(ge=0, lt=0.5)
+    cohesion: Pressure = Field(ge=0, le=1e8)
+    friction_angle: Angle = Field(ge=0, lt=60)
+    dilatancy_angle: Angle = Field(ge=0, lt=60)
+    tensile_strength: Pressure = Field(default=0.0, ge=0)
+    porosity: float
+    loose_porosity: float
+    grain_density: Density = Field(gt=1000, lt=10000)
+    hydraulic_conductivity: Velocity
+    k0: float = Field(gt=0, lt=5)
+
+    @model_validator(mode="after")
+    def _check(self):
+        who = f"soil '{self.name}'"
+        if not 0.05 < self.porosity < 0.9:
+            raise ValueError(
+                f"{who}: porosity must lie in (0.05, 0.9), got {self.porosity:g}; give a fraction, not percent"
+            )
+        if not self.porosity < self.loose_porosity <= 0.9:
+            raise ValueError(
+                f"{who}: loose_porosity (above it grains do not touch) must lie between porosity "
+                f"{self.porosity:g} and 0.9, got {self.loose_porosity:g}"
+            )
+        if not 0 < self.hydraulic_conductivity <= 10:
+            raise ValueError(
+                f"{who}: hydraulic_conductivity must lie in (0, 10] m/s, got {self.hydraulic_conductivity:g}; "
+                "give the Darcy conductivity in m/s, sand about 1e-4"
+            )
+        if self.dilatancy_angle > self.friction_angle:
+            raise ValueError(
+                f"{who}: dilatancy_angle {self.dilatancy_angle:g} deg must not exceed friction_angle "
+                f"{self.friction_angle:g} deg; the flow rule would create energy"
+            )
+        if self.model == "mohr-coulomb" and self.friction_angle == 0 and self.cohesion == 0:
+            raise ValueError(f"{who}: friction_angle and cohesion are both 0: no strength at all; give one of them")
+        return self
+
+
+class Tunnel(Part):
+    """A circular tunnel; `cover` is the depth of its outer crown."""
+
+    x: Length
+    cover: Length = Field(gt=0)
+    outer_diameter: Length = Field(gt=0)
+    inner_diameter: Length = Field(gt=0)
+    friction_coefficient: float = Field(ge=0, le=2)
+
+    @model_validator(mode="after")
+    def _check(self):
+        if self.inner_diameter >= self.outer_diameter:
+            raise ValueError(
+                f"tunnel: inner_diameter {self.inner_diameter:g} m must be smaller than outer_diameter "
+                f"{self.outer_diameter:g} m"
+            )
+        return self
+
+    @property
+    def outer_radius(self):
+        """[m]"""
+        return self.outer_diameter / 2
+
+    @property
+    def inner_radius(self):
+        """[m]"""
+        return self.inner_diameter / 2
+
+    @property
+    def axis_depth(self):
+        """Depth of the axis below the surface [m]."""
+        return self.cover + self.outer_radius
+
+
+class Gate(Part):
+    """The gap through the lining: straight walls of the given distance, along the radius at `angle`."""
+
+    tunnel: int = Field(default=0, ge=0)
+    angle: Angle = Field(ge=0, lt=360)
+    width: Length = Field(gt=0)
+
+
+class Discretisation(Part):
+    """Mesh sizes [m] and points per element; the size grows by `size_growth` per metre away from a feature."""
+
+    element_size: Length = Field(gt=0)
+    element_size_lining: Length = Field(gt=0)
+    element_size_interior: Length = Field(gt=0)
+    elements_across_gate: int = Field(default=4, ge=2, le=40)
+    gate_radius: Length = Field(gt=0)
+    size_growth: float = Field(default=0.12, gt=0, le=1)
+    points_per_element: int = 3
+    points_per_element_gate: int = 12
+
+    @model_validator(mode="after")
+    def _check(self):
+        for name in ("points_per_element", "points_per_element_gate"):
+            n = getattr(self, name)
+            if n < 1 or not (n == 6 or math.isqrt(n) ** 2 == n or (n % 3 == 0 and math.isqrt(n // 3) ** 2 == n // 3)):
+                raise ValueError(f"{name} must be 6, k^2 or 3 k^2 (1, 3, 4, 9, 12, 16, 25, ..), got {n}; use 3 or 12")
+        return self
+
+
+class Numerics(Part):
+    """Numerical choices, none of which should decide the answer; `pressure_filter` 0 turns the filter off."""
+
+    courant: float = Field(default=0.5, gt=0, le=1)
+    flip_fraction: float = Field(default=0.99, ge=0, le=1)
+    pressure_filter: float = Field(default=0.05, ge=0, le=1)
+    volumetric_smoothing: bool = True
+    relaxation_tolerance: float = Field(default=1e-5, gt=0, lt=1)
+    max_relaxation_steps: int = Field(default=20000, ge=1)
+
+
+class Stop(Part):
+    """Where a run ends: at a time [s], at an inflow mass [kg/m], or whichever comes first."""
+
+    time: Time | None = Field(default=None, gt=0)
+    inflow_mass: Mass | None = Field(default=None, gt=0)
+
+    @model_validator(mode="after")
+    def _check(self):
+        if self.time is None and self.inflow_mass is None:
+            raise ValueError("stop: give time, inflow_mass or both; without either the run never ends")
+        return self
+
+
+class Output(Part):
+    """Interval of the records and of the snapshots of all points [s]."""
+
+    interval: Time = Field(gt=0)
+    snapshot_interval: Time | None = Field(default=None, gt=0)
+
+
+class Scene(Part):
+    """Everything that the material point method needs to know."""
+
+    name: str = Field(min_length=1, max_length=80, pattern=r"^[\w.-]+$")
+    gravity: Acceleration = Field(default=9.81, ge=0, le=100)
+    box: Box
+    water: Water
+    soils: tuple[Soil, ...] = Field(min_length=1)
+    tunnels: tuple[Tunnel, ...] = ()
+    gate: Gate | None = None
+    lining: Literal["fixed"] = "fixed"
+    initial_contact: Literal["bonded", "frictional"] = "bonded"
+    interior: Literal["resolved", "sink"] = "resolved"
+    discretisation: Discretisation
+    numerics: Numerics = Numerics()
+    stop: Stop
+    output: Output
+
+    @model_validator(mode="after")
+    def _check(self):
+        tops = [soil.top_depth for soil in self.soils]
+        if tops[0] != 0 or any(b <= a for a, b in zip(tops, tops[1:], strict=False)):
+            raise ValueError(f"soils: top_depth must start at 0 and increase, got {tops}")
+        if tops[-1] >= self.box.depth:
+            raise ValueError(f"soils: top_depth {tops[-1]:g} m lies below the box of depth {self.box.depth:g} m")
+        if self.water.table_depth > 0 and self.water.table_depth >= self.box.depth:
+            raise ValueError(
+                f"water: table_depth {self.water.table_depth:g} m lies below the box of depth {self.box.depth:g} m"
+            )
+        size = self.discretisation.element_size
+        for k, t in enumerate(self.tunnels):
+            sides = (
+                self.box.width / 2 - abs(t.x) - t.outer_radius,
+                self.box.depth - t.axis_depth - t.outer_radius,
+            )
+            if min(sides) < size:
+                raise ValueError(
+                    f"tunnel {k}: outside the box or closer to its edge than one element: it spans x = "
+                    f"{t.x - t.outer_radius:g} .. {t.x + t.outer_radius:g} m and reaches depth "
+                    f"{t.axis_depth + t.outer_radius:g} m in a box of width {self.box.width:g} m and depth "
+                    f"{self.box.depth:g} m; move the tunnel or enlarge the box"
+                )
+            for j, other in enumerate(self.tunnels[:k]):
+                gap = (
+                    math.hypot(t.x - other.x, t.axis_depth - other.axis_depth) - t.outer_radius - other.outer_radius
+                )
+                if gap <= 0:
+                    raise ValueError(f"tunnels {j} and {k} overlap by {-gap:g} m; increase the axis spacing")
+        if self.gate is not None:
+            if self.gate.tunnel >= len(self.tunnels):
+                raise ValueError(
+                    f"gate: tunnel {self.gate.tunnel} does not exist; there are {len(self.tunnels)}, counted from 0"
+                )
+            t = self.tunnels[self.gate.tunnel]
+            if self.gate.width > 0.5 * t.inner_radius:
+                raise ValueError(
+                    f"gate: width {self.gate.width:g} m is wider than a segment can lose: at most a quarter of the "
+                    f"inner diameter, {0.5 * t.inner_radius:g} m; check the unit (metres)"
+                )
+        elif self.stop.inflow_mass is not None and self.stop.time is None:
+            raise ValueError("stop: inflow_mass is never reached without a gate; give stop.time or a gate")
+        elements = self.estimated_elements
+        if elements > 4e6:
+            raise ValueError(
+                f"discretisation: about {elements:.2g} elements would need {elements * 1e3 / 1e9:.0f} GB of memory; "
+                "raise element_size, element_size_lining or size_growth"
+            )
+        return self
+
+    @cached_property
+    def estimated_elements(self):
+        """Rough number of elements, from the integral of the inverse element area [-]."""
+        d = self.discretisation
+        area = 0.433  # equilateral triangle of unit edge
+        count = self.box.width * self.box.depth / (area * d.element_size**2)
+        for t in self.tunnels:
+            count += _graded(2 * math.pi * t.outer_radius, d.element_size_lining, d.element_size, d.size_growth) / area
+            if self.gate is not None and self.interior == "resolved":
+                count += math.pi * t.inner_radius**2 / (area * d.element_size_interior**2)
+        if self.gate is not None:
+            size = self.gate.width / d.elements_across_gate
+            near = math.pi * (self.gate.width + size / d.size_growth) ** 2
+            count += near / (area * size**2)
+        return count
+
+
+def _graded(length, small, large, growth):
+    """Integral of 1/size^2 beside a line of the given length whose size grows away from it."""
+    return 0.0 if small >= large else length * (1 / small - 1 / large) / growth

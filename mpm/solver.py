@@ -1,0 +1,446 @@
+"""The two-phase solver: arrays, threads, and a step that reads as the algorithm."""
+
+import math
+import os
+from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
+
+import numpy as np
+
+from mpm import stages
+from mpm.contact import FIXED_X, FIXED_Y, remap_nodes, smooth_rates, solve_nodes
+from mpm.points import fill, initial_stress, relocate, sort_by_element
+from mpm.time_step import critical_time_step, fast_wave_speed
+from mpm.transfer import advance_points, element_rates, points_to_nodes, update_points
+from mpm.variables import (
+    BUFFER_WIDTH,
+    CLAMPS,
+    MASS,
+    MODEL_ELASTIC,
+    MODEL_MOHR_COULOMB,
+    NODE_WIDTH,
+    POINT_VARIABLES,
+    RATE_WIDTH,
+    SOIL_WIDTH,
+    V_P,
+    VSX,
+    VSY,
+    X0,
+    Y0,
+    N,
+    X,
+    Y,
+)
+
+PARTS = 2  # parts of the mesh that sum at the nodes on their own: fixed, so the bits do not depend on threads
+STEPS_BETWEEN_SORTS = 100
+SMALLEST_PARALLEL = 4000  # elements; below it a second thread costs more than it brings
+
+
+class RunFailed(RuntimeError):
+    """A run that went wrong: `cause`, simulated `time` [s] and `place` (x, y) [m] of the first bad point."""
+
+    def __init__(self, cause, time, place):
+        self.cause, self.time, self.place = cause, time, place
+        super().__init__(f"{cause} at t = {time:.6g} s, x = {place[0]:.3f} m, y = {place[1]:.3f} m")
+
+
+class Solver:
+    """Two-phase MPM on a body-fitted triangle mesh with a fixed lining.
+
+    Parameters
+    ----------
+    scene : mpm.scene.Scene
+    mesh : mpm.mesh.Mesh
+    threads : int or None
+        Threads of the kernels; the result has the same bits for any number. None: all cores.
+    """
+
+    def __init__(self, scene, mesh, threads=None):
+        self.scene, self.mesh = scene, mesh
+        self.points, self.element_of_point, self.soil_of_point = fill(mesh, scene)
+        self.soils = soil_table(scene)
+        self.parts = PARTS
+        m, n = len(mesh.elements), len(mesh.nodes)
+        self.geometry = element_geometry(mesh)
+        self.neighbours = element_neighbours(mesh, outflow_nodes(scene, mesh))
+        self.fixed = np.zeros(n, np.int8)
+        self.fixed[mesh.left] |= FIXED_X
+        self.fixed[mesh.right] |= FIXED_X
+        self.fixed[mesh.bottom] |= FIXED_X | FIXED_Y
+        self._build_contact()
+        self.start = np.zeros(m + 1, np.int32)
+        self.order = np.zeros(len(self.points), np.int32)
+        self.occupied = np.zeros(m, np.int32)
+        self.sums = np.zeros((PARTS, n, BUFFER_WIDTH))
+        self.momenta = np.zeros((PARTS, n, 4))
+        self.divergences = np.zeros((PARTS, n, 3))
+        self.nodes = np.zeros((n, NODE_WIDTH))
+        self.status = np.zeros(n, np.int8)
+        self.rates = np.zeros((m, RATE_WIDTH))
+        self.volume = np.zeros(m)
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+        self.threads = 1 if m < SMALLEST_PARALLEL else max(1, min(threads or cores, PARTS))
+        self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
+        self.clamps = np.zeros((PARTS, len(CLAMPS)), np.int64)
+        self.time, self.step_count, self.point_steps = 0.0, 0, 0
+        self.initial_volume = self._volumes()
+        self.initial_grain_mass = float(np.sum(self.points[:, MASS]))
+        self._sort()
+        self._update_wave_speed()
+        # the projection of the initial pore pressure: hydrostatic, exact for linear functions
+        _, pressure = initial_stress(scene, -mesh.nodes[:, 1])
+        self.nodes[:, V_P] = pressure
+        self.removed_mass = 0.0
+        self.suspended = 0
+        self.gate_open = False
+
+    # -- set-up ---------------------------------------------------------------------------------
+
+    def _build_contact(self):
+        mesh, scene = self.mesh, self.scene
+        node, closed, opened, active_closed, active_open, friction = [], [], [], [], [], []
+        lining = []
+        corner_angle = {}
+        opening = set(mesh.opening_nodes.tolist()) if scene.gate is not None else set()
+        corners = mesh.corner_nodes.tolist() if scene.gate is not None else []
+        if scene.gate is not None:
+            a = math.radians(scene.gate.angle)
+            tangent = np.array([math.cos(a), -math.sin(a)])
+            # the corner on the smaller-angle side bounds the channel from below in angle
+            corner_angle = {corners[0]: tangent, corners[1]: -tangent}
+        for t, tunnel in enumerate(scene.tunnels):
+            axis = np.array([tunnel.x, -tunnel.axis_depth])
+            outer = mesh.outer_nodes[t]
+            first = len(node)
+            for i in outer:
+                radial = (mesh.nodes[i] - axis) / np.linalg.norm(mesh.nodes[i] - axis)
+                node.append(i)
+                closed.append(radial)
+                opened.append(corner_angle.get(int(i), radial))
+                active_closed.append(True)
+                active_open.append(int(i) not in opening)
+                friction.append(tunnel.friction_coefficient)
+            edge = np.linalg.norm(np.roll(mesh.nodes[outer], -1, axis=0) - mesh.nodes[outer], axis=1)
+            arc = 0.5 * (edge + np.roll(edge, 1))
+            bears_open = np.array([int(i) not in opening and int(i) not in corners for i in outer])
+            lining.append(
+                SimpleNamespace(theta=mesh.outer_theta[t], arc=arc, rows=np.arange(first, len(node)), bears=bears_open)
+            )
+        if scene.gate is not None:
+            tunnel = scene.tunnels[scene.gate.tunnel]
+            axis = np.array([tunnel.x, -tunnel.axis_depth])
+            for i, side in zip(mesh.wall_nodes, mesh.wall_side, strict=True):
+                node.append(i)
+                closed.append(side * tangent)
+                opened.append(side * tangent)
+            for i in mesh.inner_nodes:
+                inward = (axis - mesh.nodes[i]) / np.linalg.norm(mesh.nodes[i] - axis)
+                node.append(i)
+                closed.append(inward)
+                opened.append(inward)
+            rest = len(node) - len(active_closed)
+            active_closed += [True] * rest
+            active_open += [True] * rest
+            friction += [tunnel.friction_coefficient] * rest
+        self.contact_of_node = np.full(len(mesh.nodes), -1, np.int32)
+        self.contact_of_node[np.array(node, int)] = np.arange(len(node), dtype=np.int32)
+        self.n_contact = len(node)
+        self.normal = np.array(closed, float).reshape(-1, 2)
+        self._normal_open = np.array(opened, float).reshape(-1, 2)
+        self.active = np.array(active_closed, np.int8)
+        self._active_open = np.array(active_open, np.int8)
+        self.friction = np.array(friction, float)
+        self.lining = lining
+        self.impulse = np.zeros((len(node), 5))
+
+    def _volumes(self):
+        rho = np.array([s.grain_density for s in self.scene.soils])[self.soil_of_point]
+        return self.points[:, MASS] / (rho * (1 - self.points[:, N]))
+
+    def _sort(self):
+        self.n_occupied, self.n_active = sort_by_element(
+            self.element_of_point, len(self.mesh.elements), self.start, self.order, self.occupied
+        )
+        counts = self.start[self.occupied[: self.n_occupied] + 1]
+        shares = np.linspace(0, self.n_active, PARTS + 1)[1:-1]
+        self._element_cuts = [0, *np.searchsorted(counts, shares).tolist(), self.n_occupied]
+        self._node_cuts = np.linspace(0, len(self.mesh.nodes), PARTS + 1).astype(int).tolist()
+
+    def _sort_physically(self):
+        inside = self.order[: self.n_active]
+        outside = np.flatnonzero(self.element_of_point < 0)
+        new = np.concatenate([inside, outside])
+        self.points = np.ascontiguousarray(self.points[new])
+        self.element_of_point = self.element_of_point[new]
+        self.soil_of_point = self.soil_of_point[new]
+        self.initial_volume = self.initial_volume[new]
+        self._sort()
+
+    def _update_wave_speed(self):
+        speeds = []
+        for k, soil in enumerate(self.scene.soils):
+            mine = (self.soil_of_point == k) & (self.element_of_point >= 0)
+            if mine.any():
+                speeds.append(
+                    fast_wave_speed(
+                        self.soils[k, 1] + 2 * self.soils[k, 2],
+                        self.scene.water.bulk_modulus,
+                        float(self.points[mine, N].min()),
+                        soil.grain_density,
+                        self.scene.water.density,
+                    )
+                )
+        self.wave_speed = max(speeds)
+
+    # -- threads --------------------------------------------------------------------------------
+
+    def over_elements(self, kernel, *arguments, per_range=()):
+        """Run a kernel over all occupied elements, one range a thread; returns the list of its results."""
+        return self._over(self._element_cuts, kernel, arguments, per_range)
+
+    def over_nodes(self, kernel, *arguments, per_range=()):
+        """Run a kernel over all nodes, one range a thread; returns the list of its results."""
+        return self._over(self._node_cuts, kernel, arguments, per_range)
+
+    def _over(self, cuts, kernel, arguments, per_range):
+        def call(r):
+            return kernel(cuts[r], cuts[r + 1], *arguments, *(a[r] for a in per_range))
+
+        if self._pool is None:
+            return [call(r) for r in range(PARTS)]
+        others = [self._pool.submit(call, r) for r in range(1, PARTS)]
+        return [call(0), *(o.result() for o in others)]
+
+    # -- information ----------------------------------------------------------------------------
+
+    @property
+    def n_points(self):
+        """Number of material points, those taken out included."""
+        return len(self.points)
+
+    def memory_bytes(self):
+        """Bytes held in the arrays of the solver."""
+        return sum(a.nbytes for a in vars(self).values() if isinstance(a, np.ndarray))
+
+    def time_step_estimate(self):
+        """Time step of the state at hand [s] and the name of what limits it."""
+        return critical_time_step(self.map_points(), self.wave_speed, self.scene.numerics.courant)
+
+    def points_by_name(self):
+        """Copy of the state of all points, one array a variable, with volume, displacement and soil number."""
+        data = {name: self.points[:, k].copy() for k, (name, _, _) in enumerate(POINT_VARIABLES)}
+        data["displacement_x"] = data["x"] - data.pop("x_initial")
+        data["displacement_y"] = data["y"] - data.pop("y_initial")
+        data["volume"] = self._volumes()
+        data["soil"] = self.soil_of_point.copy()
+        data["removed"] = self.element_of_point < 0
+        return data
+
+    # -- stages ---------------------------------------------------------------------------------
+
+    def map_points(self):
+        """Sum the points at the nodes without moving anything; returns the step limits of the parts."""
+        return self.over_elements(
+            points_to_nodes, self.occupied, self.start, self.order, self.points, self.soil_of_point, self.soils,
+            self.scene.water.density, self.mesh.elements, self.geometry, self.nodes, self.wave_speed, self.volume,
+            per_range=(self.sums,),
+        )  # fmt: skip
+
+    def relax(self, progress=None):
+        """Drained initial equilibrium; returns (steps, residual) and leaves the reactions in `impulse`."""
+        numerics = self.scene.numerics
+        friction = self.friction
+        if self.scene.initial_contact == "bonded":
+            friction = np.full_like(friction, np.inf)
+        steps, residual, reaction = stages.relax(
+            self, friction, numerics.relaxation_tolerance, numerics.max_relaxation_steps, progress
+        )
+        self.impulse[:] = 0.0
+        self.impulse[:, 0:3] = reaction
+        self.impulse[:, 3:5] = reaction[:, 0:2] ** 2
+        return steps, residual
+
+    def open_gate(self):
+        """Take the plug away: the opening is free, its corners belong to the channel walls."""
+        self.normal = self._normal_open
+        self.active = self._active_open
+        self.gate_open = True
+
+    def step(self, dt_max=math.inf):
+        """Advance by one time step, not longer than dt_max [s]; returns (dt, name of its limit)."""
+        s, numerics, water = self.scene, self.scene.numerics, self.scene.water
+        layout = (self.occupied, self.start, self.order, self.points, self.soil_of_point, self.soils)
+        grid = (self.mesh.elements, self.geometry, self.nodes)
+        wall = (self.fixed, self.contact_of_node, self.normal, self.active)
+
+        dt, limit = critical_time_step(self.map_points(), self.wave_speed, numerics.courant)
+        if dt > dt_max:
+            dt, limit = dt_max, "output"
+        self.over_nodes(
+            solve_nodes, self.sums, dt, s.gravity, water.density, *wall, self.friction, self.nodes,
+            self.status, self.impulse,
+        )  # fmt: skip
+        self.over_elements(
+            advance_points, *layout, water.density, *grid, dt, numerics.flip_fraction, numerics.pressure_filter,
+            per_range=(self.momenta,),
+        )  # fmt: skip
+        self.over_nodes(remap_nodes, self.momenta, *wall, self.nodes, self.status)
+        self.over_elements(element_rates, self.occupied, *grid, self.volume, self.rates, per_range=(self.divergences,))
+        if numerics.volumetric_smoothing:
+            self.over_nodes(smooth_rates, self.divergences, self.nodes)
+        outcome = self.over_elements(
+            update_points, *layout, water.bulk_modulus, *grid, self.rates, self.volume, dt,
+            numerics.volumetric_smoothing, self.element_of_point, per_range=(self.clamps,),
+        )  # fmt: skip
+        self._check(outcome)
+        self.suspended = sum(o[2] for o in outcome)
+        if any(o[0] for o in outcome):
+            self._relocate()
+        self.time += dt
+        self.step_count += 1
+        self.point_steps += self.n_active
+        if self.step_count % STEPS_BETWEEN_SORTS == 0:
+            self._sort_physically()
+            self._update_wave_speed()
+        return dt, limit
+
+    def _relocate(self):
+        removed = relocate(self.element_of_point, self.points, self.geometry, self.neighbours, self.clamps[0])
+        if removed:
+            self.removed_mass = float(np.sum(self.points[self.element_of_point == -1, MASS]))
+        self._sort()
+
+    def _check(self, outcome):
+        bad = [o[1] for o in outcome if o[1] >= 0]
+        if bad:
+            raise RunFailed(
+                "a material point became non-finite (velocity, stress or pore pressure)",
+                self.time,
+                self.points[bad[0], X : Y + 1],
+            )
+
+    # -- measures -------------------------------------------------------------------------------
+
+    def inflow_mass(self):
+        """Grains inside the gate's tunnel, those taken out included [kg/m]."""
+        if self.scene.gate is None:
+            return 0.0
+        tunnel = self.scene.tunnels[self.scene.gate.tunnel]
+        r2 = (self.points[:, X] - tunnel.x) ** 2 + (self.points[:, Y] + tunnel.axis_depth) ** 2
+        inside = (r2 < tunnel.inner_radius**2) & (self.element_of_point >= 0)
+        return float(np.sum(self.points[inside, MASS])) + self.removed_mass
+
+    def measures(self):
+        """Zones, balances and extremes of the state at hand, as a dict of floats."""
+        moved = np.hypot(self.points[:, X] - self.points[:, X0], self.points[:, Y] - self.points[:, Y0])
+        flow = moved > 0.05
+        mass = self.points[:, MASS]
+        speed2 = self.points[:, VSX] ** 2 + self.points[:, VSY] ** 2
+        active = self.element_of_point >= 0
+        return {
+            "inflow_mass": self.inflow_mass(),
+            "flow_zone_area": float(np.sum(self.initial_volume[flow])),
+            "disturbed_area": float(np.sum(self.initial_volume[(moved > 0.01) & ~flow])),
+            "grain_mass": float(np.sum(mass)),
+            "suspended_fraction": float(self.suspended) / max(self.n_active, 1),
+            "kinetic_energy": float(0.5 * np.sum((mass * speed2)[active])),
+            "max_velocity": float(np.sqrt(speed2[active].max(initial=0.0))),
+        }
+
+    def lining_pressures(self, duration):
+        """Mean pressures on every tunnel's lining since the impulses were last cleared [Pa].
+
+        Parameters
+        ----------
+        duration : float
+            Time over which impulses were summed [s]; 1.0 after `relax`.
+        """
+        result = []
+        for part in self.lining:
+            impulse = self.impulse[part.rows] / duration
+            bears = part.bears if self.gate_open else np.ones(len(part.arc), bool)
+            arc = part.arc
+            mean_s, mean_l, shear = (np.where(bears, impulse[:, k] / arc, 0.0) for k in range(3))
+            spread = [
+                np.where(bears, np.sqrt(np.maximum(impulse[:, k + 3] / arc**2 - mean**2, 0.0)), 0.0)
+                for k, mean in ((0, mean_s), (1, mean_l))
+            ]
+            result.append(
+                {
+                    "theta": part.theta,
+                    "arc": arc,
+                    "soil_pressure": mean_s,
+                    "water_pressure": mean_l,
+                    "soil_shear": -shear,
+                    "soil_pressure_std": spread[0],
+                    "water_pressure_std": spread[1],
+                }
+            )
+        return result
+
+
+def soil_table(scene):
+    """Parameters of the soils as the kernels read them: (n_soils, 12) float64."""
+    table = np.zeros((len(scene.soils), SOIL_WIDTH))
+    for row, soil in zip(table, scene.soils, strict=True):
+        shear = soil.youngs_modulus / (2 * (1 + soil.poissons_ratio))
+        lam = 2 * shear * soil.poissons_ratio / (1 - 2 * soil.poissons_ratio)
+        phi, psi = math.radians(soil.friction_angle), math.radians(soil.dilatancy_angle)
+        apex = soil.cohesion / math.tan(phi) if phi > 0 else math.inf
+        row[:] = (
+            MODEL_ELASTIC if soil.model == "elastic" else MODEL_MOHR_COULOMB,
+            lam,
+            shear,
+            lam + 2 * shear / 3,
+            soil.cohesion * math.cos(phi),
+            math.sin(phi),
+            math.sin(psi),
+            apex,
+            min(soil.tensile_strength, apex),
+            soil.loose_porosity,
+            scene.gravity / soil.hydraulic_conductivity,
+            soil.grain_density,
+        )
+    return table
+
+
+def element_geometry(mesh):
+    """Gradients, first corner, area and smallest altitude of every element: (n_elements, 8) float64."""
+    c = mesh.nodes[mesh.elements]
+    e1, e2 = c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]
+    det = e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]
+    longest = np.max([np.linalg.norm(v, axis=1) for v in (e1, e2, e2 - e1)], axis=0)
+    columns = [e2[:, 1] / det, -e2[:, 0] / det, -e1[:, 1] / det, e1[:, 0] / det, c[:, 0, 0], c[:, 0, 1], det / 2]
+    return np.ascontiguousarray(np.stack([*columns, det / longest], axis=1))
+
+
+def outflow_nodes(scene, mesh):
+    """Nodes at the inner end of the channel where a sink takes material out; none for a resolved interior."""
+    if scene.gate is None or scene.interior != "sink":
+        return np.zeros(0, int)
+    tunnel = scene.tunnels[scene.gate.tunnel]
+    radius = np.hypot(mesh.nodes[:, 0] - tunnel.x, mesh.nodes[:, 1] + tunnel.axis_depth)
+    return np.flatnonzero(radius < tunnel.inner_radius * (1 + 1e-9))
+
+
+def element_neighbours(mesh, outflow):
+    """Element across the edge opposite each corner; -1 at a wall, -2 at the outflow of a sink: (n_elements, 3) int32."""
+    edges = {}
+    neighbours = np.full((len(mesh.elements), 3), -1, np.int32)
+    for e, corner in enumerate(mesh.elements.tolist()):
+        for k in range(3):
+            a, b = corner[(k + 1) % 3], corner[(k + 2) % 3]
+            key = (a, b) if a < b else (b, a)
+            other = edges.pop(key, None)
+            if other is None:
+                edges[key] = (e, k)
+            else:
+                neighbours[e, k] = other[0]
+                neighbours[other] = e
+    outflow = set(outflow.tolist())
+    for (a, b), (e, k) in edges.items():
+        if a in outflow and b in outflow:
+            neighbours[e, k] = -2
+    return neighbours
+

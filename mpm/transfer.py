@@ -1,0 +1,435 @@
+"""Points to nodes and back: the kernels of a step that pass over the points, element by element.
+
+Each kernel works on a range of the list of occupied elements and writes only to rows that these
+elements own, so ranges may run in any number of threads with the same bits. Shape functions are
+those of the linear triangle; `geometry` rows hold (g1x, g1y, g2x, g2y, x0, y0, area, height).
+"""
+
+import numpy as np
+
+from mpm.jit import kernel
+from mpm.materials.mohr_coulomb import mohr_coulomb
+from mpm.variables import (
+    B_D,
+    B_FLX,
+    B_FLY,
+    B_FX,
+    B_FY,
+    B_ML,
+    B_MN,
+    B_MS,
+    B_PLX,
+    B_PLY,
+    B_PSX,
+    B_PSY,
+    B_Q,
+    C_CAVITATED,
+    C_CEILING,
+    C_FLOOR,
+    C_SUSPENDED,
+    C_TENSION,
+    EQ,
+    MASS,
+    MODEL_ELASTIC,
+    POROSITY_CEILING,
+    POROSITY_FLOOR,
+    R_DL,
+    R_DS,
+    R_W,
+    R_XX,
+    R_XY,
+    R_YY,
+    S_APEX,
+    S_C_COS,
+    S_DRAG,
+    S_G,
+    S_K,
+    S_LAMBDA,
+    S_LOOSE,
+    S_MODEL,
+    S_RHO_S,
+    S_SIN,
+    S_SIN_DIL,
+    S_TENSION,
+    SXX,
+    SXY,
+    SYY,
+    SZZ,
+    V_DLX,
+    V_DLY,
+    V_DSX,
+    V_DSY,
+    V_LX,
+    V_LY,
+    V_P,
+    V_SX,
+    V_SY,
+    V_TL,
+    V_TS,
+    VLX,
+    VLY,
+    VSX,
+    VSY,
+    N,
+    P,
+    X,
+    Y,
+)
+
+
+@kernel
+def points_to_nodes(
+    first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, elements, geometry, nodes,
+    wave_speed, volume, sums,
+):  # fmt: skip
+    """Sum masses, momenta, drag and internal forces of the points at the nodes.
+
+    Parameters
+    ----------
+    first, last : int
+        Range of `occupied`.
+    occupied, start, order : (n_occupied,), (n_elements + 1,), (n_points,) int32
+        Elements that hold points; points of element e are order[start[e]:start[e + 1]].
+    points : (n_points, 16) float64
+    nodes : (n_nodes, 13) float64
+        Read: the pressure projection of the last step.
+    wave_speed : float
+        [m/s]
+    volume : (n_elements,) float64
+        Written: material volume [m2].
+    sums : (n_nodes, 13) float64
+        Written: what these elements add to every node.
+
+    Returns
+    -------
+    tuple of two floats
+        Smallest altitude / (wave speed + point speed) [s] and the point speed there [m/s].
+    """
+    sums[:] = 0.0
+    limit = np.inf
+    limit_speed = 0.0
+    for k in range(first, last):
+        e = occupied[k]
+        g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
+        x0, y0 = geometry[e, 4], geometry[e, 5]
+        p0, p1, p2 = nodes[elements[e, 0], V_P], nodes[elements[e, 1], V_P], nodes[elements[e, 2], V_P]
+        ms0 = ms1 = ms2 = ml0 = ml1 = ml2 = mn0 = mn1 = mn2 = d0 = d1 = d2 = q0 = q1 = q2 = 0.0
+        sx0 = sx1 = sx2 = sy0 = sy1 = sy2 = lx0 = lx1 = lx2 = ly0 = ly1 = ly2 = 0.0
+        fxx = fxy = fyy = fp = total = fastest = 0.0
+        for j in range(start[e], start[e + 1]):
+            i = order[j]
+            soil = soil_of_point[i]
+            m = points[i, MASS]
+            n = points[i, N]
+            v = m / (soils[soil, S_RHO_S] * (1.0 - n))
+            dx = points[i, X] - x0
+            dy = points[i, Y] - y0
+            n1 = g1x * dx + g1y * dy
+            n2 = g2x * dx + g2y * dy
+            n0 = 1.0 - n1 - n2
+            ms0 += n0 * m
+            ms1 += n1 * m
+            ms2 += n2 * m
+            w = v * density_liquid
+            w0, w1, w2 = n0 * w, n1 * w, n2 * w
+            ml0 += w0
+            ml1 += w1
+            ml2 += w2
+            mn0 += n * w0
+            mn1 += n * w1
+            mn2 += n * w2
+            drag = n * soils[soil, S_DRAG]
+            d0 += drag * w0
+            d1 += drag * w1
+            d2 += drag * w2
+            vx, vy = points[i, VSX], points[i, VSY]
+            sx0 += n0 * m * vx
+            sx1 += n1 * m * vx
+            sx2 += n2 * m * vx
+            sy0 += n0 * m * vy
+            sy1 += n1 * m * vy
+            sy2 += n2 * m * vy
+            ux, uy = points[i, VLX], points[i, VLY]
+            lx0 += w0 * ux
+            lx1 += w1 * ux
+            lx2 += w2 * ux
+            ly0 += w0 * uy
+            ly1 += w1 * uy
+            ly2 += w2 * uy
+            fastest = max(fastest, vx * vx + vy * vy, ux * ux + uy * uy)
+            p = max(points[i, P], 0.0)
+            r = v * (p - (n0 * p0 + n1 * p1 + n2 * p2))
+            q0 += n0 * r
+            q1 += n1 * r
+            q2 += n2 * r
+            fxx += v * (points[i, SXX] - p)
+            fyy += v * (points[i, SYY] - p)
+            fxy += v * points[i, SXY]
+            fp += v * p
+            total += v
+        volume[e] = total
+        fastest = np.sqrt(fastest)
+        local = geometry[e, 7] / (wave_speed + fastest)
+        if local < limit:
+            limit = local
+            limit_speed = fastest
+        g0x, g0y = -g1x - g2x, -g1y - g2y
+        b = sums[elements[e, 0]]
+        b[B_MS] += ms0
+        b[B_ML] += ml0
+        b[B_MN] += mn0
+        b[B_D] += d0
+        b[B_Q] += q0
+        b[B_PSX] += sx0
+        b[B_PSY] += sy0
+        b[B_PLX] += lx0
+        b[B_PLY] += ly0
+        b[B_FX] -= g0x * fxx + g0y * fxy
+        b[B_FY] -= g0x * fxy + g0y * fyy
+        b[B_FLX] += g0x * fp
+        b[B_FLY] += g0y * fp
+        b = sums[elements[e, 1]]
+        b[B_MS] += ms1
+        b[B_ML] += ml1
+        b[B_MN] += mn1
+        b[B_D] += d1
+        b[B_Q] += q1
+        b[B_PSX] += sx1
+        b[B_PSY] += sy1
+        b[B_PLX] += lx1
+        b[B_PLY] += ly1
+        b[B_FX] -= g1x * fxx + g1y * fxy
+        b[B_FY] -= g1x * fxy + g1y * fyy
+        b[B_FLX] += g1x * fp
+        b[B_FLY] += g1y * fp
+        b = sums[elements[e, 2]]
+        b[B_MS] += ms2
+        b[B_ML] += ml2
+        b[B_MN] += mn2
+        b[B_D] += d2
+        b[B_Q] += q2
+        b[B_PSX] += sx2
+        b[B_PSY] += sy2
+        b[B_PLX] += lx2
+        b[B_PLY] += ly2
+        b[B_FX] -= g2x * fxx + g2y * fxy
+        b[B_FY] -= g2x * fxy + g2y * fyy
+        b[B_FLX] += g2x * fp
+        b[B_FLY] += g2y * fp
+    return limit, limit_speed
+
+
+@kernel
+def advance_points(
+    first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, elements, geometry, nodes,
+    dt, flip_fraction, pressure_filter, sums,
+):  # fmt: skip
+    """Advance point velocities and positions from the nodes and map the new momenta back (MUSL).
+
+    Velocities take `flip_fraction` of the FLIP and the rest of the PIC update; positions move with
+    the solid. A positive pore pressure is drawn by `pressure_filter` towards its projection on
+    continuous linear functions: what such a function can represent is left as it is.
+    `sums` (n_nodes, 4) receives the new momenta of both phases [kg m/s per metre].
+
+    Source: Sulsky, Zhou & Schreyer (1995) for MUSL; Zhu & Bridson (2005) for the PIC/FLIP blend.
+    """
+    sums[:] = 0.0
+    for k in range(first, last):
+        e = occupied[k]
+        g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
+        x0, y0 = geometry[e, 4], geometry[e, 5]
+        a = nodes[elements[e, 0]]
+        b = nodes[elements[e, 1]]
+        c = nodes[elements[e, 2]]
+        sx0 = sx1 = sx2 = sy0 = sy1 = sy2 = lx0 = lx1 = lx2 = ly0 = ly1 = ly2 = 0.0
+        pic = 1.0 - flip_fraction
+        for j in range(start[e], start[e + 1]):
+            i = order[j]
+            row = points[i]
+            m = row[MASS]
+            w = m / (soils[soil_of_point[i], S_RHO_S] * (1.0 - row[N])) * density_liquid
+            dx = row[X] - x0
+            dy = row[Y] - y0
+            n1 = g1x * dx + g1y * dy
+            n2 = g2x * dx + g2y * dy
+            n0 = 1.0 - n1 - n2
+            gx = n0 * a[V_SX] + n1 * b[V_SX] + n2 * c[V_SX]
+            gy = n0 * a[V_SY] + n1 * b[V_SY] + n2 * c[V_SY]
+            hx = n0 * a[V_LX] + n1 * b[V_LX] + n2 * c[V_LX]
+            hy = n0 * a[V_LY] + n1 * b[V_LY] + n2 * c[V_LY]
+            vx = flip_fraction * (row[VSX] + n0 * a[V_DSX] + n1 * b[V_DSX] + n2 * c[V_DSX]) + pic * gx
+            vy = flip_fraction * (row[VSY] + n0 * a[V_DSY] + n1 * b[V_DSY] + n2 * c[V_DSY]) + pic * gy
+            ux = flip_fraction * (row[VLX] + n0 * a[V_DLX] + n1 * b[V_DLX] + n2 * c[V_DLX]) + pic * hx
+            uy = flip_fraction * (row[VLY] + n0 * a[V_DLY] + n1 * b[V_DLY] + n2 * c[V_DLY]) + pic * hy
+            row[VSX], row[VSY], row[VLX], row[VLY] = vx, vy, ux, uy
+            row[X] += dt * gx
+            row[Y] += dt * gy
+            if row[P] > 0.0:
+                smooth = max(n0 * a[V_P] + n1 * b[V_P] + n2 * c[V_P], 0.0)
+                row[P] += pressure_filter * (smooth - row[P])
+            sx0 += n0 * m * vx
+            sx1 += n1 * m * vx
+            sx2 += n2 * m * vx
+            sy0 += n0 * m * vy
+            sy1 += n1 * m * vy
+            sy2 += n2 * m * vy
+            lx0 += n0 * w * ux
+            lx1 += n1 * w * ux
+            lx2 += n2 * w * ux
+            ly0 += n0 * w * uy
+            ly1 += n1 * w * uy
+            ly2 += n2 * w * uy
+        d = sums[elements[e, 0]]
+        d[0] += sx0
+        d[1] += sy0
+        d[2] += lx0
+        d[3] += ly0
+        d = sums[elements[e, 1]]
+        d[0] += sx1
+        d[1] += sy1
+        d[2] += lx1
+        d[3] += ly1
+        d = sums[elements[e, 2]]
+        d[0] += sx2
+        d[1] += sy2
+        d[2] += lx2
+        d[3] += ly2
+
+
+@kernel
+def element_rates(first, last, occupied, elements, geometry, nodes, volume, rates, sums):
+    """Strain rates, spin and divergences of the remapped velocities, constant in an element [1/s].
+
+    `sums` (n_nodes, 3) receives material volume and volume times both divergences, for their nodal
+    means (Detournay & Dzik 2006).
+    """
+    sums[:] = 0.0
+    for k in range(first, last):
+        e = occupied[k]
+        g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
+        a = nodes[elements[e, 0]]
+        b = nodes[elements[e, 1]]
+        c = nodes[elements[e, 2]]
+        ux1, ux2 = b[V_SX] - a[V_SX], c[V_SX] - a[V_SX]
+        uy1, uy2 = b[V_SY] - a[V_SY], c[V_SY] - a[V_SY]
+        xx = g1x * ux1 + g2x * ux2
+        yy = g1y * uy1 + g2y * uy2
+        xy = g1y * ux1 + g2y * ux2
+        yx = g1x * uy1 + g2x * uy2
+        r = rates[e]
+        r[R_XX], r[R_YY], r[R_XY], r[R_W] = xx, yy, 0.5 * (xy + yx), 0.5 * (yx - xy)
+        r[R_DS] = xx + yy
+        r[R_DL] = (
+            g1x * (b[V_LX] - a[V_LX]) + g2x * (c[V_LX] - a[V_LX])
+            + g1y * (b[V_LY] - a[V_LY]) + g2y * (c[V_LY] - a[V_LY])
+        )  # fmt: skip
+        v = volume[e]
+        for corner in range(3):
+            d = sums[elements[e, corner]]
+            d[0] += v
+            d[1] += v * r[R_DS]
+            d[2] += v * r[R_DL]
+
+
+@kernel
+def update_points(
+    first, last, occupied, start, order, points, soil_of_point, soils, bulk_liquid, elements, geometry, nodes,
+    rates, volume, dt, smoothing, element_of_point, clamps,
+):  # fmt: skip
+    """Advance stress, pore pressure and porosity of the points of a range of elements, in place.
+
+    Jaumann rate of effective stress; mass balance of the mixture for the pore pressure,
+    dp/dt = -(K_w/n) [(1 - n) div v_s + n div v_l] (Jassim et al. 2013, opposite sign of p).
+    A negative pore pressure is a memory of missing volume and carries nothing. Above the loose
+    porosity grains do not touch: no effective stress; and while the element is not full, closing
+    the air between suspended lumps builds neither stress nor pressure.
+
+    Returns
+    -------
+    tuple of three ints
+        Number of points that left their element, first point with a non-finite state or -1,
+        and number of suspended points.
+    """
+    moved = 0
+    bad = -1
+    suspended = 0
+    third = 1.0 / 3.0
+    for k in range(first, last):
+        e = occupied[k]
+        g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
+        x0, y0 = geometry[e, 4], geometry[e, 5]
+        r = rates[e]
+        if smoothing:
+            i0, i1, i2 = elements[e, 0], elements[e, 1], elements[e, 2]
+            ts = third * (nodes[i0, V_TS] + nodes[i1, V_TS] + nodes[i2, V_TS])
+            tl = third * (nodes[i0, V_TL] + nodes[i1, V_TL] + nodes[i2, V_TL])
+        else:
+            ts, tl = r[R_DS], r[R_DL]
+        correction = 0.5 * (ts - r[R_DS])
+        exx = dt * (r[R_XX] + correction)
+        eyy = dt * (r[R_YY] + correction)
+        exy = dt * r[R_XY]
+        spin = dt * r[R_W]
+        ts *= dt
+        tl *= dt
+        mean = ts * third
+        equivalent = np.sqrt(2.0 * third * ((exx - mean) ** 2 + (eyy - mean) ** 2 + mean * mean + 2.0 * exy * exy))
+        full = volume[e] >= geometry[e, 6]
+        for j in range(start[e], start[e + 1]):
+            i = order[j]
+            row = points[i]
+            s = soils[soil_of_point[i]]
+            n = row[N]
+            p = row[P]
+            loose = n >= s[S_LOOSE]
+            row[EQ] += equivalent
+            if loose and p <= 0.0 and not full:
+                # lumps with air between them: shape changes, neither grains nor water are squeezed
+                row[SXX] = row[SYY] = row[SZZ] = row[SXY] = 0.0
+                row[P] = 0.0
+                suspended += 1
+                clamps[C_SUSPENDED] += 1
+            else:
+                p -= bulk_liquid / n * ((1.0 - n) * ts + n * tl)
+                row[P] = p
+                if p < 0.0:
+                    clamps[C_CAVITATED] += 1
+                if not (loose and p <= 0.0 and ts > 0.0):
+                    n = 1.0 - (1.0 - n) / (1.0 + ts)
+                    if n < POROSITY_FLOOR:
+                        n = POROSITY_FLOOR
+                        clamps[C_FLOOR] += 1
+                    elif n > POROSITY_CEILING:
+                        n = POROSITY_CEILING
+                        clamps[C_CEILING] += 1
+                    row[N] = n
+                if n >= s[S_LOOSE]:
+                    row[SXX] = row[SYY] = row[SZZ] = row[SXY] = 0.0
+                    suspended += 1
+                    clamps[C_SUSPENDED] += 1
+                else:
+                    lam, shear = s[S_LAMBDA], s[S_G]
+                    sxx, syy, sxy = row[SXX], row[SYY], row[SXY]
+                    turn = 2.0 * spin * sxy
+                    txx = sxx - turn + lam * ts + 2.0 * shear * exx
+                    tyy = syy + turn + lam * ts + 2.0 * shear * eyy
+                    txy = sxy + spin * (sxx - syy) + 2.0 * shear * exy
+                    tzz = row[SZZ] + lam * ts
+                    if s[S_MODEL] != MODEL_ELASTIC:
+                        txx, tyy, tzz, txy, cut = mohr_coulomb(
+                            txx, tyy, tzz, txy, shear, s[S_K], s[S_C_COS], s[S_SIN], s[S_SIN_DIL], s[S_APEX],
+                            s[S_TENSION],
+                        )  # fmt: skip
+                        if cut > 0.0:
+                            clamps[C_TENSION] += 1
+                    row[SXX], row[SYY], row[SZZ], row[SXY] = txx, tyy, tzz, txy
+            if bad < 0 and not np.isfinite(row[SXX] + row[P] + row[VSX] + row[VSY] + row[VLX] + row[VLY] + row[N]):
+                bad = i
+            dx = row[X] - x0
+            dy = row[Y] - y0
+            n1 = g1x * dx + g1y * dy
+            n2 = g2x * dx + g2y * dy
+            if n1 < 0.0 or n2 < 0.0 or n1 + n2 > 1.0:
+                element_of_point[i] = -2 - e  # left: to be searched from e
+                moved += 1
+    return moved, bad, suspended

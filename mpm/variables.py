@@ -1,0 +1,51 @@
+"""The one table of what a material point carries, with its unit and sign, and of what a node carries.
+
+A point is one row of 16 float64 (two cache lines), so that a point reached through an index
+costs two memory accesses whatever is read of it. Effective stress is tension positive, pore
+pressure compression positive; total stress = effective stress - pore pressure * identity.
+"""
+
+POINT_VARIABLES = (
+    # name, unit, meaning
+    ("x", "m", "horizontal position"),
+    ("y", "m", "vertical position, upward, ground surface at 0"),
+    ("velocity_solid_x", "m s-1", "velocity of the grains"),
+    ("velocity_solid_y", "m s-1", "velocity of the grains"),
+    ("velocity_liquid_x", "m s-1", "velocity of the pore water"),
+    ("velocity_liquid_y", "m s-1", "velocity of the pore water"),
+    ("stress_xx", "Pa", "effective stress, tension positive"),
+    ("stress_yy", "Pa", "effective stress, tension positive"),
+    ("stress_zz", "Pa", "effective stress out of plane, tension positive"),
+    ("stress_xy", "Pa", "effective shear stress"),
+    ("pore_pressure", "Pa", "compression positive; negative: missing volume of water, carries nothing"),
+    ("porosity", "1", "volume of voids over total volume"),
+    ("grain_mass", "kg m-1", "mass of grains per metre of tunnel, constant"),
+    ("x_initial", "m", "horizontal position at the start"),
+    ("y_initial", "m", "vertical position at the start"),
+    ("deviatoric_strain", "1", "accumulated equivalent deviatoric strain, sqrt(2/3 e:e)"),
+)
+(X, Y, VSX, VSY, VLX, VLY, SXX, SYY, SZZ, SXY, P, N, MASS, X0, Y0, EQ) = range(len(POINT_VARIABLES))
+POINT_WIDTH = len(POINT_VARIABLES)
+
+# Element-to-node buffer: what an element adds to one of its nodes.
+(B_MS, B_ML, B_MN, B_D, B_PSX, B_PSY, B_PLX, B_PLY, B_Q, B_FX, B_FY, B_FLX, B_FLY) = range(13)
+BUFFER_WIDTH = 13
+
+# Node row: end-of-step velocities, their increments, masses, the pressure projection, smoothed rates.
+(V_MS, V_ML, V_SX, V_SY, V_LX, V_LY, V_DSX, V_DSY, V_DLX, V_DLY, V_P, V_TS, V_TL) = range(13)
+NODE_WIDTH = 13
+
+# Element rates: strain rates, spin, divergence of both phases.
+(R_XX, R_YY, R_XY, R_W, R_DS, R_DL) = range(6)
+RATE_WIDTH = 6
+
+# Soil parameters, one row a soil.
+(S_MODEL, S_LAMBDA, S_G, S_K, S_C_COS, S_SIN, S_SIN_DIL, S_APEX, S_TENSION, S_LOOSE, S_DRAG, S_RHO_S) = range(12)
+SOIL_WIDTH = 12
+MODEL_ELASTIC, MODEL_MOHR_COULOMB = 0, 1
+
+# Values that a clamp of the physics may touch; each is counted and reported with the run.
+CLAMPS = ("tension", "suspended", "cavitated", "porosity_floor", "porosity_ceiling", "returned_to_mesh")
+(C_TENSION, C_SUSPENDED, C_CAVITATED, C_FLOOR, C_CEILING, C_RETURNED) = range(len(CLAMPS))
+POROSITY_FLOOR = 0.05
+POROSITY_CEILING = 0.90
