@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -91,7 +92,7 @@ class Mesh:
 
     @cached_property
     def quality(self) -> dict[str, float]:
-        """Counts, smallest altitude [m] and its place [m], smallest and largest angle [deg], share of angles below 30."""
+        """Counts, smallest altitude and its place [m], extreme angles [deg], share of triangles with one below 30."""
         altitude = altitudes(self.nodes, self.elements)
         angle = np.degrees(angles(self.nodes, self.elements))
         worst = int(altitude.argmin())
@@ -245,8 +246,8 @@ def element_size(scene: Scene, x: NDArray[np.float64], y: NDArray[np.float64]) -
     d = scene.discretisation
     x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     size = np.full(np.broadcast(x, y).shape, d.element_size)
-    for tunnel in scene.tunnels:
-        gap = np.abs(np.hypot(x - tunnel.x, y + tunnel.axis_depth) - tunnel.outer_radius)
+    for each in scene.tunnels:
+        gap = np.abs(np.hypot(x - each.x, y + each.axis_depth) - each.outer_radius)
         size = np.minimum(size, d.element_size_lining + d.size_growth * gap)
     gate, tunnel = scene.gate, _gate_tunnel(scene)
     if gate is None or tunnel is None:
@@ -297,7 +298,7 @@ def _ring(scene: Scene, tunnel: Tunnel, radius: float, forced: list[float]) -> l
     """Angles [deg, ascending from forced[0], within one turn] of the nodes of a ring through the `forced` angles."""
     stations = [*forced, forced[0] + 360.0]
     result: list[float] = []
-    for start, end in zip(stations, stations[1:], strict=False):
+    for start, end in pairwise(stations):
         result += [start, *_divide(scene, tunnel, radius, start, end)]
     return result
 
@@ -347,7 +348,7 @@ class _Drawing:
 
     def edges(self, chain: list[int]) -> list[int]:
         """Lines that are one mesh edge each."""
-        tags = [self.line(a, b) for a, b in zip(chain, chain[1:], strict=False)]
+        tags = [self.line(a, b) for a, b in pairwise(chain)]
         for tag in tags:
             self.geo.mesh.setTransfiniteCurve(abs(tag), 2)
         return tags
@@ -359,7 +360,9 @@ class _Drawing:
 
 def _on_ring(draw: _Drawing, tunnel: Tunnel, radius: float, theta: list[float]) -> list[int]:
     return [
-        draw.point(tunnel.x + radius * math.sin(math.radians(t)), -tunnel.axis_depth + radius * math.cos(math.radians(t)))
+        draw.point(
+            tunnel.x + radius * math.sin(math.radians(t)), -tunnel.axis_depth + radius * math.cos(math.radians(t))
+        )
         for t in theta
     ]
 
@@ -404,7 +407,7 @@ def _draw_lining(scene: Scene, draw: _Drawing) -> _Outline:
         stations = sorted([opening[-1], *rest, gate.angle + 180.0])
         stations.append(opening[0] + 360.0)
         outside = [stations[0]]
-        for start, end in zip(stations, stations[1:], strict=False):
+        for start, end in pairwise(stations):
             outside += [*_divide(scene, tunnel, tunnel.outer_radius, start, end), end]
         theta = opening + outside[1:-1]
         tags = _on_ring(draw, tunnel, tunnel.outer_radius, theta)
@@ -425,7 +428,7 @@ def _draw_channel(scene: Scene, draw: _Drawing, outline: _Outline, tunnel: Tunne
     tags = _on_ring(draw, tunnel, tunnel.inner_radius, opening)
     outline.inner_corners = [tags[0], tags[-1]]
     outline.inner_opening = tags[1:-1]
-    length = (tunnel.outer_radius - tunnel.inner_radius)
+    length = tunnel.outer_radius - tunnel.inner_radius
     pieces = max(1, round(length / _gate_size(scene)))
     for corner, inner in zip(outline.corners, outline.inner_corners, strict=True):
         (x0, y0), (x1, y1) = draw.exact[corner], draw.exact[inner]
@@ -451,7 +454,7 @@ def _draw(scene: Scene, gmsh: Any) -> tuple[_Drawing, _Outline, dict[int, int], 
     left = [draw.point(-half, y) for y in levels]
     right = [draw.point(half, y) for y in levels]
     upper_left, upper_right = draw.point(-half, top), draw.point(half, top)
-    side_left = [draw.line(a, b) for a, b in zip(left, left[1:], strict=False)]
+    side_left = [draw.line(a, b) for a, b in pairwise(left)]
     side_right = [draw.line(a, b) for a, b in zip(right[::-1], right[-2::-1], strict=False)]
     bottom = draw.line(left[-1], right[-1])
     ground = draw.line(right[0], left[0])
@@ -635,9 +638,7 @@ def _extract(
     renumber[used] = np.arange(len(used))
     nodes, triangles = nodes[used], renumber[triangles]
 
-    node_of_point = {
-        tag: int(renumber[node_of_tag[gmsh.model.mesh.getNodes(0, tag)[0][0]]]) for tag in draw.exact
-    }
+    node_of_point = {tag: int(renumber[node_of_tag[gmsh.model.mesh.getNodes(0, tag)[0][0]]]) for tag in draw.exact}
     for tag, position in draw.exact.items():
         nodes[node_of_point[tag]] = position
 
@@ -648,9 +649,7 @@ def _extract(
     places = {"left": (0, -scene.box.width / 2), "right": (0, scene.box.width / 2)}
     places |= {"bottom": (1, -scene.box.depth), "top": (1, _headroom(scene))}
     for name, curves in sides.items():
-        on_side = np.concatenate(
-            [gmsh.model.mesh.getNodes(1, abs(curve), includeBoundary=True)[0] for curve in curves]
-        )
+        on_side = np.concatenate([gmsh.model.mesh.getNodes(1, abs(curve), includeBoundary=True)[0] for curve in curves])
         members = np.unique(renumber[node_of_tag[on_side]])
         axis, value = places[name]
         nodes[members, axis] = value

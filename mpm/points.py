@@ -162,17 +162,95 @@ def sort_by_element(element_of_point, n_elements, start, order, occupied):
 
 
 @kernel
-def relocate(element_of_point, points, geometry, neighbours, clamps):
+def update_order(element_of_point, moved_point, moved_from, n_moved, start, order, occupied, new_start, new_order):
+    """Repair the sorting by element after a few points have moved, copying what lies between them.
+
+    Equal to `sort_by_element` to the last entry, at the cost of a copy.
+
+    moved_point, moved_from : (n,) int32
+        The first n_moved entries: points, ascending, and the elements that they have left.
+    new_start, new_order
+        Written; `occupied` as well. Returns the number of occupied elements and of points.
+    """
+    n_elements = start.size - 1
+    for e in range(n_elements + 1):
+        new_start[e] = 0
+    for k in range(n_moved):
+        new_start[moved_from[k] + 1] -= 1
+        e = element_of_point[moved_point[k]]
+        if e >= 0:
+            new_start[e + 1] += 1
+    filled = 0
+    shift = 0
+    read = 0  # everything of `order` before this entry is already copied or dropped
+    write = 0
+    touched = np.zeros(2 * n_moved, np.int32)
+    n_touched = 0
+    for k in range(n_moved):
+        touched[n_touched] = moved_from[k]
+        n_touched += 1
+        e = element_of_point[moved_point[k]]
+        if e >= 0:
+            touched[n_touched] = e
+            n_touched += 1
+    touched[:n_touched].sort()
+    arriving = np.argsort(element_of_point[moved_point[:n_moved]], kind="mergesort")
+    a = 0
+    last = -1
+    for k in range(n_touched):
+        e = touched[k]
+        if e == last:
+            continue
+        last = e
+        for j in range(read, start[e]):
+            new_order[write] = order[j]
+            write += 1
+        read = start[e]
+        while a < n_moved and element_of_point[moved_point[arriving[a]]] < e:
+            a += 1
+        while read < start[e + 1] or (a < n_moved and element_of_point[moved_point[arriving[a]]] == e):
+            incoming = a < n_moved and element_of_point[moved_point[arriving[a]]] == e
+            if read < start[e + 1] and (not incoming or order[read] < moved_point[arriving[a]]):
+                i = order[read]
+                read += 1
+                if element_of_point[i] == e:
+                    new_order[write] = i
+                    write += 1
+            else:
+                i = moved_point[arriving[a]]
+                a += 1
+                if read < start[e + 1] and order[read] == i:
+                    read += 1  # it left and came back within the search
+                new_order[write] = i
+                write += 1
+    for j in range(read, start[n_elements]):
+        new_order[write] = order[j]
+        write += 1
+    for e in range(n_elements):
+        shift += new_start[e + 1]
+        new_start[e + 1] = start[e + 1] + shift
+        if new_start[e + 1] > new_start[e]:
+            occupied[filled] = e
+            filled += 1
+    return filled, write
+
+
+@kernel
+def relocate(element_of_point, points, geometry, neighbours, clamps, moved_point, moved_from):
     """Find the new element of every point that left its own, walking over neighbours.
 
     A point that would cross the boundary of the mesh is put back on it (and counted); one that
-    crosses an outflow edge (neighbour -2) is taken out: element -1.
+    crosses an outflow edge (neighbour -2) is taken out: element -1. The points that changed their
+    element and the elements that they left are written to `moved_point`, `moved_from` in ascending
+    order of points; returns their number and that of the points taken out.
     """
     removed = 0
+    n_moved = 0
     for i in range(element_of_point.size):
         if element_of_point[i] > -2:
             continue
         e = -2 - element_of_point[i]
+        left = e
         for _ in range(10000):
             g = geometry[e]
             dx = points[i, X] - g[4]
@@ -215,4 +293,8 @@ def relocate(element_of_point, points, geometry, neighbours, clamps):
             clamps[C_RETURNED] += 1
             break
         element_of_point[i] = e
-    return removed
+        if e != left:
+            moved_point[n_moved] = i
+            moved_from[n_moved] = left
+            n_moved += 1
+    return n_moved, removed

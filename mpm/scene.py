@@ -6,32 +6,46 @@ middle of the box. Numbers that decide the answer have no default; numerical one
 """
 
 import math
-from functools import cached_property
+import os
+from functools import cache, cached_property
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 
-def quantity(unit):
-    """A float field in `unit` that also takes a string with a unit, converted by pint."""
+@cache
+def _unit_registry():
+    import pint  # loaded only where a scene uses strings with units
 
-    def convert(value: Any):
+    return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
+
+
+def in_unit(unit: str) -> BeforeValidator:
+    """Lets a float field in `unit` also take a string with a unit, converted by pint."""
+
+    def convert(value: Any) -> Any:
         if not isinstance(value, str):
             return value
-        import pint  # loaded only where a scene uses strings with units
-
-        registry = pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
         try:
+            registry = _unit_registry()
             return registry.Quantity(value.replace("m3", "m**3").replace("m2", "m**2")).to(unit).magnitude
         except Exception as error:
-            raise ValueError(f"cannot read {value!r} as a quantity in {unit}: {error}") from None
+            raise ValueError(
+                f"must be a quantity in {unit}, got {value!r}: {error}; write it like '20 {unit}'"
+            ) from None
 
-    return Annotated[float, BeforeValidator(convert)]
+    return BeforeValidator(convert)
 
 
-Length, Pressure, Density = quantity("m"), quantity("Pa"), quantity("kg/m**3")
-Angle, Velocity, Time, Mass = quantity("degree"), quantity("m/s"), quantity("s"), quantity("kg/m")
-Acceleration = quantity("m/s**2")
+Length = Annotated[float, in_unit("m")]
+Pressure = Annotated[float, in_unit("Pa")]
+Density = Annotated[float, in_unit("kg/m**3")]
+Angle = Annotated[float, in_unit("degree")]
+Velocity = Annotated[float, in_unit("m/s")]
+Time = Annotated[float, in_unit("s")]
+Mass = Annotated[float, in_unit("kg/m")]
+Acceleration = Annotated[float, in_unit("m/s**2")]
 
 
 class Part(BaseModel):
@@ -216,7 +230,7 @@ class Scene(Part):
     @model_validator(mode="after")
     def _check(self):
         tops = [soil.top_depth for soil in self.soils]
-        if tops[0] != 0 or any(b <= a for a, b in zip(tops, tops[1:], strict=False)):
+        if tops[0] != 0 or any(b <= a for a, b in pairwise(tops)):
             raise ValueError(f"soils: top_depth must start at 0 and increase, got {tops}")
         if tops[-1] >= self.box.depth:
             raise ValueError(f"soils: top_depth {tops[-1]:g} m lies below the box of depth {self.box.depth:g} m")
@@ -238,9 +252,7 @@ class Scene(Part):
                     f"{self.box.depth:g} m; move the tunnel or enlarge the box"
                 )
             for j, other in enumerate(self.tunnels[:k]):
-                gap = (
-                    math.hypot(t.x - other.x, t.axis_depth - other.axis_depth) - t.outer_radius - other.outer_radius
-                )
+                gap = math.hypot(t.x - other.x, t.axis_depth - other.axis_depth) - t.outer_radius - other.outer_radius
                 if gap <= 0:
                     raise ValueError(f"tunnels {j} and {k} overlap by {-gap:g} m; increase the axis spacing")
         if self.gate is not None:
@@ -256,11 +268,11 @@ class Scene(Part):
                 )
         elif self.stop.inflow_mass is not None and self.stop.time is None:
             raise ValueError("stop: inflow_mass is never reached without a gate; give stop.time or a gate")
-        elements = self.estimated_elements
-        if elements > 4e6:
+        needed, available = self.estimated_bytes, _physical_memory()
+        if needed > available:
             raise ValueError(
-                f"discretisation: about {elements:.2g} elements would need {elements * 1e3 / 1e9:.0f} GB of memory; "
-                "raise element_size, element_size_lining or size_growth"
+                f"discretisation: must fit in memory ({available / 1e9:.3g} GB), got about {needed / 1e9:.3g} GB for "
+                f"{self.estimated_elements:.2g} elements; raise element_size, element_size_lining or size_growth"
             )
         return self
 
@@ -279,6 +291,19 @@ class Scene(Part):
             near = math.pi * (self.gate.width + size / d.size_growth) ** 2
             count += near / (area * size**2)
         return count
+
+    @property
+    def estimated_bytes(self):
+        """Memory of a run [bytes]: an element's mesh, adjacency and buffers, a point's state and two copies."""
+        return self.estimated_elements * (1500 + 600 * self.discretisation.points_per_element)
+
+
+def _physical_memory():
+    """Memory of this machine [bytes]; infinite where the system does not tell."""
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return math.inf
 
 
 def _graded(length, small, large, growth):

@@ -9,7 +9,7 @@ import numpy as np
 
 from mpm import stages
 from mpm.contact import FIXED_X, FIXED_Y, remap_nodes, smooth_rates, solve_nodes
-from mpm.points import fill, initial_stress, relocate, sort_by_element
+from mpm.points import fill, initial_stress, relocate, sort_by_element, update_order
 from mpm.time_step import critical_time_step, fast_wave_speed
 from mpm.transfer import advance_points, element_rates, points_to_nodes, update_points
 from mpm.variables import (
@@ -86,6 +86,8 @@ class Solver:
         self.time, self.step_count, self.point_steps = 0.0, 0, 0
         self.initial_volume = self._volumes()
         self.initial_grain_mass = float(np.sum(self.points[:, MASS]))
+        self._spare = self.start.copy(), self.order.copy()
+        self._moved = np.zeros(len(self.points), np.int32), np.zeros(len(self.points), np.int32)
         self._sort()
         self._update_wave_speed()
         # the projection of the initial pore pressure: hydrostatic, exact for linear functions
@@ -113,11 +115,10 @@ class Solver:
             axis = np.array([tunnel.x, -tunnel.axis_depth])
             outer = mesh.outer_nodes[t]
             first = len(node)
-            for i in outer:
-                radial = (mesh.nodes[i] - axis) / np.linalg.norm(mesh.nodes[i] - axis)
+            for i, outward in zip(outer, self._balanced_normals(outer), strict=True):
                 node.append(i)
-                closed.append(radial)
-                opened.append(corner_angle.get(int(i), radial))
+                closed.append(outward)
+                opened.append(corner_angle.get(int(i), outward))
                 active_closed.append(True)
                 active_open.append(int(i) not in opening)
                 friction.append(tunnel.friction_coefficient)
@@ -154,6 +155,22 @@ class Solver:
         self.lining = lining
         self.impulse = np.zeros((len(node), 5))
 
+    def _balanced_normals(self, outer):
+        """Normals of the outer face along the resultant of the hydrostatic pressure at each node.
+
+        On a polygon the resultant of a pressure on the two edges of a node is not radial. A wall
+        that can only push along the radius would let still water creep along it.
+        """
+        position = self.mesh.nodes[outer]
+        _, pressure = initial_stress(self.scene, -position[:, 1])
+        pressure = np.maximum(pressure, 1.0)  # above the water table: as for a uniform pressure
+        edge = np.roll(position, -1, axis=0) - position  # clockwise to the next node
+        outward = np.column_stack([-edge[:, 1], edge[:, 0]])
+        after = np.roll(pressure, -1)
+        force = outward * (2 * pressure + after)[:, None]
+        force += np.roll(outward * (pressure + 2 * after)[:, None], 1, axis=0)
+        return force / np.linalg.norm(force, axis=1)[:, None]
+
     def _volumes(self):
         rho = np.array([s.grain_density for s in self.scene.soils])[self.soil_of_point]
         return self.points[:, MASS] / (rho * (1 - self.points[:, N]))
@@ -162,9 +179,14 @@ class Solver:
         self.n_occupied, self.n_active = sort_by_element(
             self.element_of_point, len(self.mesh.elements), self.start, self.order, self.occupied
         )
-        counts = self.start[self.occupied[: self.n_occupied] + 1]
-        shares = np.linspace(0, self.n_active, PARTS + 1)[1:-1]
-        self._element_cuts = [0, *np.searchsorted(counts, shares).tolist(), self.n_occupied]
+        self._cut()
+
+    def _cut(self):
+        self._element_cuts = [0]
+        for part in range(1, PARTS):
+            element = np.searchsorted(self.start, part * self.n_active // PARTS, side="right") - 1
+            self._element_cuts.append(int(np.searchsorted(self.occupied[: self.n_occupied], element)))
+        self._element_cuts.append(self.n_occupied)
         self._node_cuts = np.linspace(0, len(self.mesh.nodes), PARTS + 1).astype(int).tolist()
 
     def _sort_physically(self):
@@ -306,10 +328,19 @@ class Solver:
         return dt, limit
 
     def _relocate(self):
-        removed = relocate(self.element_of_point, self.points, self.geometry, self.neighbours, self.clamps[0])
+        n_moved, removed = relocate(
+            self.element_of_point, self.points, self.geometry, self.neighbours, self.clamps[0], *self._moved
+        )
         if removed:
             self.removed_mass = float(np.sum(self.points[self.element_of_point == -1, MASS]))
-        self._sort()
+        if n_moved:
+            start, order = self._spare
+            self.n_occupied, self.n_active = update_order(
+                self.element_of_point, *self._moved, n_moved, self.start, self.order, self.occupied, start, order
+            )
+            self._spare = self.start, self.order
+            self.start, self.order = start, order
+            self._cut()
 
     def _check(self, outcome):
         bad = [o[1] for o in outcome if o[1] >= 0]

@@ -118,12 +118,13 @@ def points_to_nodes(
         fxx = fxy = fyy = fp = total = fastest = 0.0
         for j in range(start[e], start[e + 1]):
             i = order[j]
-            soil = soil_of_point[i]
-            m = points[i, MASS]
-            n = points[i, N]
-            v = m / (soils[soil, S_RHO_S] * (1.0 - n))
-            dx = points[i, X] - x0
-            dy = points[i, Y] - y0
+            row = points[i]
+            soil = soils[soil_of_point[i]]
+            m = row[MASS]
+            n = row[N]
+            v = m / (soil[S_RHO_S] * (1.0 - n))
+            dx = row[X] - x0
+            dy = row[Y] - y0
             n1 = g1x * dx + g1y * dy
             n2 = g2x * dx + g2y * dy
             n0 = 1.0 - n1 - n2
@@ -138,18 +139,18 @@ def points_to_nodes(
             mn0 += n * w0
             mn1 += n * w1
             mn2 += n * w2
-            drag = n * soils[soil, S_DRAG]
+            drag = n * soil[S_DRAG]
             d0 += drag * w0
             d1 += drag * w1
             d2 += drag * w2
-            vx, vy = points[i, VSX], points[i, VSY]
+            vx, vy = row[VSX], row[VSY]
             sx0 += n0 * m * vx
             sx1 += n1 * m * vx
             sx2 += n2 * m * vx
             sy0 += n0 * m * vy
             sy1 += n1 * m * vy
             sy2 += n2 * m * vy
-            ux, uy = points[i, VLX], points[i, VLY]
+            ux, uy = row[VLX], row[VLY]
             lx0 += w0 * ux
             lx1 += w1 * ux
             lx2 += w2 * ux
@@ -157,14 +158,14 @@ def points_to_nodes(
             ly1 += w1 * uy
             ly2 += w2 * uy
             fastest = max(fastest, vx * vx + vy * vy, ux * ux + uy * uy)
-            p = max(points[i, P], 0.0)
+            p = max(row[P], 0.0)
             r = v * (p - (n0 * p0 + n1 * p1 + n2 * p2))
             q0 += n0 * r
             q1 += n1 * r
             q2 += n2 * r
-            fxx += v * (points[i, SXX] - p)
-            fyy += v * (points[i, SYY] - p)
-            fxy += v * points[i, SXY]
+            fxx += v * (row[SXX] - p)
+            fyy += v * (row[SYY] - p)
+            fxy += v * row[SXY]
             fp += v * p
             total += v
         volume[e] = total
@@ -351,8 +352,8 @@ def update_points(
         and number of suspended points.
     """
     moved = 0
+    n_suspended = n_cavitated = n_floor = n_ceiling = n_tension = 0
     bad = -1
-    suspended = 0
     third = 1.0 / 3.0
     for k in range(first, last):
         e = occupied[k]
@@ -374,6 +375,7 @@ def update_points(
         tl *= dt
         mean = ts * third
         equivalent = np.sqrt(2.0 * third * ((exx - mean) ** 2 + (eyy - mean) ** 2 + mean * mean + 2.0 * exy * exy))
+        shrink = 1.0 / (1.0 + ts)
         full = volume[e] >= geometry[e, 6]
         for j in range(start[e], start[e + 1]):
             i = order[j]
@@ -387,26 +389,24 @@ def update_points(
                 # lumps with air between them: shape changes, neither grains nor water are squeezed
                 row[SXX] = row[SYY] = row[SZZ] = row[SXY] = 0.0
                 row[P] = 0.0
-                suspended += 1
-                clamps[C_SUSPENDED] += 1
+                n_suspended += 1
             else:
                 p -= bulk_liquid / n * ((1.0 - n) * ts + n * tl)
                 row[P] = p
                 if p < 0.0:
-                    clamps[C_CAVITATED] += 1
+                    n_cavitated += 1
                 if not (loose and p <= 0.0 and ts > 0.0):
-                    n = 1.0 - (1.0 - n) / (1.0 + ts)
+                    n = 1.0 - (1.0 - n) * shrink
                     if n < POROSITY_FLOOR:
                         n = POROSITY_FLOOR
-                        clamps[C_FLOOR] += 1
+                        n_floor += 1
                     elif n > POROSITY_CEILING:
                         n = POROSITY_CEILING
-                        clamps[C_CEILING] += 1
+                        n_ceiling += 1
                     row[N] = n
                 if n >= s[S_LOOSE]:
                     row[SXX] = row[SYY] = row[SZZ] = row[SXY] = 0.0
-                    suspended += 1
-                    clamps[C_SUSPENDED] += 1
+                    n_suspended += 1
                 else:
                     lam, shear = s[S_LAMBDA], s[S_G]
                     sxx, syy, sxy = row[SXX], row[SYY], row[SXY]
@@ -421,7 +421,7 @@ def update_points(
                             s[S_TENSION],
                         )  # fmt: skip
                         if cut > 0.0:
-                            clamps[C_TENSION] += 1
+                            n_tension += 1
                     row[SXX], row[SYY], row[SZZ], row[SXY] = txx, tyy, tzz, txy
             if bad < 0 and not np.isfinite(row[SXX] + row[P] + row[VSX] + row[VSY] + row[VLX] + row[VLY] + row[N]):
                 bad = i
@@ -432,4 +432,9 @@ def update_points(
             if n1 < 0.0 or n2 < 0.0 or n1 + n2 > 1.0:
                 element_of_point[i] = -2 - e  # left: to be searched from e
                 moved += 1
-    return moved, bad, suspended
+    clamps[C_SUSPENDED] += n_suspended
+    clamps[C_CAVITATED] += n_cavitated
+    clamps[C_FLOOR] += n_floor
+    clamps[C_CEILING] += n_ceiling
+    clamps[C_TENSION] += n_tension
+    return moved, bad, n_suspended

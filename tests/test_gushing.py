@@ -1,0 +1,111 @@
+"""The gate opens: what must hold whatever the numbers are."""
+
+import numpy as np
+import pytest
+
+import coupling
+import mpm
+import mpm.scene
+import mpm.solver
+from mpm.variables import MASS, VSX, X
+
+
+def quick(**changes):
+    return coupling.load_scene("quick").mpm.model_copy(update=changes)
+
+
+@pytest.fixture(scope="module")
+def event():
+    scene = quick(stop=mpm.scene.Stop(inflow_mass=60.0, time=2.0))
+    return scene, list(mpm.simulate(scene))
+
+
+def test_inflow_grows_and_grains_are_conserved(event):
+    _, records = event
+    inflow = [r.inflow_mass for r in records]
+    assert all(b >= a for a, b in zip(inflow, inflow[1:], strict=False)) and inflow[-1] >= 60.0
+    mass = np.array([r.grain_mass for r in records])
+    assert np.abs(mass / mass[0] - 1).max() < 1e-10
+
+
+def test_pressure_leaves_the_gate_for_its_surroundings(event):
+    scene, records = event
+    first, last = records[0].lining[0], records[-1].lining[0]
+
+    def ratio(name, *angles):
+        here = [int(np.argmin(np.abs(first["theta"] - a))) for a in angles]
+        return np.mean(last[name][here]) / np.mean(first[name][here])
+
+    gate = scene.gate.angle
+    assert ratio("water_pressure", gate - 4, gate + 4) < 1 / 3
+    assert ratio("soil_pressure", 0.0) > 1.05 and ratio("soil_pressure", 180.0) > 1.0
+    assert ratio("soil_pressure", gate - 30, gate + 30) > 1.2  # the arch
+
+
+def test_flow_zone_grows(event):
+    _, records = event
+    area = [r.flow_zone_area for r in records]
+    assert area[0] == 0.0 and all(b >= a - 1e-9 for a, b in zip(area, area[1:], strict=False)) and area[-1] > 0.3
+
+
+def test_result_has_the_same_bits_for_any_number_of_threads():
+    scene = coupling.load_scene("quick").mpm
+    mesh = mpm.build_mesh(scene)
+    states = []
+    for threads in (1, 2):
+        solver = mpm.Solver(scene, mesh, threads=threads)
+        solver.relax()
+        solver.open_gate()
+        for _ in range(150):
+            solver.step()
+        states.append(solver.points)
+    assert len(mesh.elements) > mpm.solver.SMALLEST_PARALLEL  # else the second run was serial too
+    assert np.array_equal(*states)
+
+
+def test_gate_on_the_left_mirrors_the_gate_on_the_right():
+    scene = coupling.load_scene("quick").mpm
+    mesh = mpm.build_mesh(scene)
+    left = scene.model_copy(update={"gate": scene.gate.model_copy(update={"angle": 270.0})})
+    pressures = []
+    for case, its_mesh in ((scene, mesh), (left, mesh.mirrored())):
+        solver = mpm.Solver(case, its_mesh)
+        solver.relax()
+        solver.open_gate()
+        while solver.time < 0.05:
+            solver.step(0.05 - solver.time)
+        lining = solver.lining_pressures(solver.time)[0]
+        theta = lining["theta"] if case is scene else (360.0 - lining["theta"]) % 360.0
+        order = np.argsort(theta)
+        pressures.append(np.array([lining[k][order] for k in ("soil_pressure", "water_pressure")]))
+    right, left = pressures
+    assert np.abs(left - right).max() < 1e-6 * right.max()
+
+
+def test_run_that_goes_wrong_names_cause_time_and_place():
+    solver = mpm.Solver(quick(), mpm.build_mesh(quick()))
+    solver.relax()
+    solver.open_gate()
+    solver.step()
+    solver.points[1000, VSX] = np.nan
+    with pytest.raises(mpm.RunFailed) as failure:
+        solver.step()
+    assert "non-finite" in str(failure.value) and failure.value.time == solver.time
+    assert np.all(np.abs(failure.value.place) < 100)
+
+
+def test_sink_takes_material_out_and_counts_it():
+    scene = quick(interior="sink", stop=mpm.scene.Stop(time=0.25))
+    mesh = mpm.build_mesh(scene)
+    solver = mpm.Solver(scene, mesh)
+    total = np.sum(solver.points[:, MASS])
+    solver.relax()
+    solver.open_gate()
+    while solver.time < 0.25:
+        solver.step()
+    gone = solver.element_of_point < 0
+    assert gone.any() and solver.inflow_mass() == pytest.approx(np.sum(solver.points[gone, MASS]), rel=1e-12)
+    assert np.sum(solver.points[:, MASS]) == pytest.approx(total, rel=1e-12)
+    tunnel = scene.tunnels[0]
+    inside = np.hypot(solver.points[~gone, X] - tunnel.x, solver.points[~gone, 1] + tunnel.axis_depth)
+    assert inside.min() > 0.98 * tunnel.inner_radius
