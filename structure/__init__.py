@@ -1,0 +1,27 @@
+"""Rings of segments in the ground: from lining pressures to internal forces and joint deformations.
+
+Names load on first use, so that ``import structure`` itself costs nothing.
+"""
+
+from importlib import import_module
+
+_HOMES = {
+    "Ring": "structure.ring",
+    "Ground": "structure.ring",
+    "LiningModel": "structure.lining",
+    "LiningFailure": "structure.lining",
+    "BeamSpringLining": "structure.beam_spring",
+    "theoretical_pressures": "structure.theory",
+}
+
+__all__ = sorted(_HOMES)
+
+
+def __getattr__(name):
+    if name in _HOMES:
+        return getattr(import_module(_HOMES[name]), name)
+    raise AttributeError(f"module 'structure' has no attribute {name!r}")
+
+
+def __dir__():
+    return sorted({*globals(), *_HOMES})

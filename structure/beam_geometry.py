@@ -1,0 +1,207 @@
+"""The ring as beam elements: nodes, constant stiffness of segments and joints, and how tractions become nodal forces.
+
+Unknowns at a node: radial w (outward), tangential v (clockwise), rotation b (clockwise). Nodes run clockwise from
+the first joint
+(or the crown); a joint has two nodes at one place, the last of one segment and the first of the next.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from structure.ring import Ring
+from structure.springs import joint_spring
+
+#: Two Gauss points an element on [0, 1]: exact for the linear loads between samples times linear shares.
+GAUSS = (0.5 - 0.5 / np.sqrt(3), 0.5 + 0.5 / np.sqrt(3))
+
+
+class RingMesh:
+    """Nodes and elements of a ring.
+
+    Attributes
+    ----------
+    node_angle : (n_nodes,) float64
+        [rad], may exceed 2 pi.
+    node_span : (n_nodes,) float64
+        Tributary angle [rad].
+    first : (n_elements,) int
+        First node of each element; its second is the next one, modulo n_nodes.
+    mid_angle, span : (n_elements,) float64
+        Mid angle and angle of an element [rad].
+    joint_before, joint_after : (n_joints,) int
+        Nodes on the counter-clockwise and on the clockwise side of each joint.
+    """
+
+    def __init__(self, ring: Ring):
+        counts = _elements_per_segment(ring)
+        starts = np.radians(ring.joint_angles or (0.0,))
+        gaps = np.radians(ring.segment_angles)
+        jointed = bool(ring.joint_angles)
+        angles, firsts = [], []
+        for start, gap, count in zip(starts, gaps, counts, strict=True):
+            offset = sum(map(len, angles))
+            firsts.append(offset + np.arange(count))
+            angles.append(start + gap * np.arange(count + jointed) / count)
+        self.node_angle = np.concatenate(angles)
+        self.n_nodes = len(self.node_angle)
+        self.first = np.concatenate(firsts)
+        self.second = (self.first + 1) % self.n_nodes
+        self.span = np.repeat(gaps / counts, counts)
+        self.mid_angle = self.node_angle[self.first] + self.span / 2
+        self.node_span = np.bincount(self.first, self.span / 2, self.n_nodes)
+        self.node_span += np.bincount(self.second, self.span / 2, self.n_nodes)
+        heads = np.cumsum([0, *map(len, angles[:-1])]) if jointed else np.zeros(0, dtype=int)
+        self.joint_after = heads
+        self.joint_before = (heads - 1) % self.n_nodes
+
+    def element_unknowns(self) -> np.ndarray:
+        """(n_elements, 6) unknowns of each element: w, v, b of its first and of its second node."""
+        return np.hstack([_unknowns(self.first), _unknowns(self.second)])
+
+    def joint_unknowns(self) -> np.ndarray:
+        """(n_joints, 6) unknowns of each joint: its counter-clockwise, then its clockwise node."""
+        return np.hstack([_unknowns(self.joint_before), _unknowns(self.joint_after)])
+
+
+def _unknowns(nodes: np.ndarray) -> np.ndarray:
+    return 3 * nodes[:, None] + np.arange(3)
+
+
+def _elements_per_segment(ring: Ring) -> np.ndarray:
+    """Elements of each segment, in proportion to its angle, n_elements in all (largest remainders)."""
+    share = ring.n_elements * np.array(ring.segment_angles) / 360
+    counts = np.maximum(np.floor(share + 1e-9).astype(int), 1)
+    left = ring.n_elements - counts.sum()
+    counts[np.argsort(counts - share, kind="stable")[:left]] += 1
+    return counts
+
+
+def element_matrices(ring: Ring, mesh: RingMesh) -> tuple[np.ndarray, np.ndarray]:
+    """Deformation-to-force of every element, in the unknowns of its nodes.
+
+    Returns
+    -------
+    forces : (n_elements, 4, 6) float64
+        Rows N, Q, M at the first node, M at the second node, per unknown.
+    stiffness : (n_elements, 6, 6) float64
+        Symmetric stiffness, per metre of tunnel.
+
+    Straight Timoshenko beam; shear enters by phi = 12 EI/(G A_s L^2). Source: Przemieniecki (1968), section 5.6.
+    """
+    half = mesh.span / 2
+    length = 2 * ring.centre_radius * np.sin(half)
+    bending, axial = ring.bending_stiffness, ring.axial_stiffness
+    phi = 12 * bending / (ring.shear_stiffness * length**2)
+    n = len(half)
+    # Rows of `local`: displacement along the chord and outward from it, and rotation, at both ends. The radius at
+    # an end leans
+    # by half the element's angle from the normal of the chord.
+    local = np.zeros((n, 6, 6))
+    for end, lean in ((0, -half), (3, half)):
+        local[:, end, end], local[:, end, end + 1] = np.sin(lean), np.cos(lean)
+        local[:, end + 1, end], local[:, end + 1, end + 1] = np.cos(lean), -np.sin(lean)
+        local[:, end + 2, end + 2] = 1
+    deformation = np.zeros((n, 3, 6))
+    deformation[:, 0, [0, 3]] = 1, -1
+    # Clockwise end rotations from the chord; the chord itself turns clockwise when its first end moves outward.
+    for row, end in ((1, 2), (2, 5)):
+        deformation[:, row, 1], deformation[:, row, 4] = -1 / length, 1 / length
+        deformation[:, row, end] = 1
+    deformation = deformation @ local
+    near = (4 + phi) * bending / (length * (1 + phi))
+    far = (2 - phi) * bending / (length * (1 + phi))
+    law = np.zeros((n, 3, 3))
+    law[:, 0, 0] = axial / length
+    law[:, 1, 1] = law[:, 2, 2] = near
+    law[:, 1, 2] = law[:, 2, 1] = far
+    end_forces = law @ deformation
+    stiffness = np.swapaxes(deformation, 1, 2) @ end_forces
+    axial_force, first_moment, second_moment = end_forces[:, 0], -end_forces[:, 1], end_forces[:, 2]
+    shear_force = -(second_moment - first_moment) / length[:, None]
+    return np.stack([axial_force, shear_force, first_moment, second_moment], axis=1), stiffness
+
+
+def joint_matrices(ring: Ring) -> tuple[np.ndarray, np.ndarray]:
+    """Jumps (opening, dislocation, rotation) per unknown (3, 6), and the stiffness (6, 6), the same at every joint."""
+    jumps = np.zeros((3, 6))
+    jumps[0, [1, 4]] = -1, 1
+    jumps[1, [0, 3]] = 1, -1
+    jumps[2, [2, 5]] = -1, 1
+    spring = joint_spring(ring)
+    return jumps, jumps.T @ np.diag([spring.normal, spring.shear, spring.rotation]) @ jumps
+
+
+def constant_stiffness(ring: Ring, mesh: RingMesh) -> sparse.csr_array:
+    """Stiffness of segments and joints, (3 n_nodes, 3 n_nodes)."""
+    element_stiffness = element_matrices(ring, mesh)[1]
+    unknowns = [mesh.element_unknowns()]
+    blocks = [element_stiffness]
+    if len(mesh.joint_after):
+        unknowns.append(mesh.joint_unknowns())
+        blocks.append(np.broadcast_to(joint_matrices(ring)[1], (len(mesh.joint_after), 6, 6)))
+    index = np.concatenate(unknowns)
+    values = np.concatenate(blocks)
+    rows = np.repeat(index, 6, axis=1)
+    columns = np.tile(index, (1, 6))
+    size = 3 * mesh.n_nodes
+    return sparse.coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)).tocsr()
+
+
+def traction_operator(ring: Ring, mesh: RingMesh, theta: np.ndarray) -> tuple[sparse.csr_array, sparse.csr_array]:
+    """Nodal forces of a pressure and of a clockwise shear on the outer face, sampled at angles `theta`.
+
+    Parameters
+    ----------
+    theta : (n_theta,) float64
+        [rad], ascending in [0, 2 pi).
+
+    Returns
+    -------
+    pressure, shear : (3 n_nodes, n_theta) sparse
+        Forces [N/m] and couples [N m/m] per Pa. Statically equivalent to the traction, linear between the samples:
+        the force on each piece
+        of the face goes to the two nodes of its element with the couple that moves it there.
+    """
+    rows, columns, pressure_values, shear_values = [], [], [], []
+    for place in GAUSS:
+        angle = mesh.node_angle[mesh.first] + place * mesh.span
+        area = ring.outer_radius * mesh.span / 2
+        samples, shares = _periodic_interpolation(theta, angle)
+        for node, node_share in ((mesh.first, 1 - place), (mesh.second, place)):
+            lean = angle - mesh.node_angle[node]
+            lean = (lean + np.pi) % (2 * np.pi) - np.pi
+            by_pressure = [-np.cos(lean), -np.sin(lean), ring.centre_radius * np.sin(lean)]
+            by_shear = [-np.sin(lean), np.cos(lean), ring.outer_radius - ring.centre_radius * np.cos(lean)]
+            for unknown in range(3):
+                for sample, share in zip(samples, shares, strict=True):
+                    rows.append(3 * node + unknown)
+                    columns.append(sample)
+                    pressure_values.append(area * node_share * share * by_pressure[unknown])
+                    shear_values.append(area * node_share * share * by_shear[unknown])
+    place = (np.concatenate(rows), np.concatenate(columns))
+    shape = (3 * mesh.n_nodes, len(theta))
+    return tuple(
+        sparse.coo_array((np.concatenate(values), place), shape=shape).tocsr()
+        for values in (pressure_values, shear_values)
+    )
+
+
+def _periodic_interpolation(theta: np.ndarray, angle: np.ndarray):
+    """Two samples around each angle [rad] and their linear shares; the last sample neighbours the first."""
+    angle = angle % (2 * np.pi)
+    after = np.searchsorted(theta, angle, side="right") % len(theta)
+    before = after - 1
+    gap = (theta[after] - theta[before]) % (2 * np.pi)
+    share = ((angle - theta[before]) % (2 * np.pi)) / gap
+    return (before % len(theta), after), (1 - share, share)
+
+
+def self_weight(ring: Ring, mesh: RingMesh) -> np.ndarray:
+    """Nodal forces of the concrete's weight, (3 n_nodes,); all of it on the centre line."""
+    weight = ring.concrete_unit_weight * ring.thickness * ring.centre_radius * mesh.node_span
+    forces = np.zeros((mesh.n_nodes, 3))
+    forces[:, 0] = -weight * np.cos(mesh.node_angle)
+    forces[:, 1] = weight * np.sin(mesh.node_angle)
+    return forces.ravel()

@@ -1,0 +1,270 @@
+"""A ring of beams, joint and soil springs, loaded on its outer face (load-structure model, Xie et al., Eq. 9)."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from structure.beam_geometry import RingMesh, element_matrices, joint_matrices, self_weight, traction_operator
+from structure.equilibrium import NoEquilibrium, RingEquilibrium
+from structure.lining import LiningFailure, LiningModel, check_pressures, response_dataset
+from structure.ring import Ring
+from structure.springs import limit_pressures
+
+#: Resultant over the sum of all nodal forces below which a ring without ground counts as balanced.
+BALANCE_TOLERANCE = 1e-6
+
+
+class BeamSpringLining(LiningModel):
+    """Straight Timoshenko beams on the centre line, zero-thickness joints, soil springs on the outer face.
+
+    Parameters
+    ----------
+    ring : Ring
+
+    Notes
+    -----
+    Forces are taken at the middle of every element, where the chord is parallel to the circle; so theta of the response
+    never falls on a joint. Soil springs start unstressed at the undeformed ring: the pressures given are what the
+    soil exerts there,
+    and the springs add what the ring's displacement mobilises.
+    """
+
+    def __init__(self, ring: Ring):
+        self.ring = ring
+        self.mesh = RingMesh(ring)
+        self._invert = int(np.argmin(np.abs((self.mesh.node_angle % (2 * np.pi)) - np.pi)))
+        held = np.zeros(0, dtype=int) if ring.ground is not None else 3 * self._invert + np.arange(3)
+        self._equilibrium = RingEquilibrium(ring, self.mesh, held)
+        self._element_forces = element_matrices(ring, self.mesh)[0]
+        self._weight = self_weight(ring, self.mesh)
+        self._joint_jumps = joint_matrices(ring)[0]
+        fine = np.radians(np.arange(0, 360, 0.5))
+        lift = traction_operator(ring, self.mesh, fine)[0] @ np.cos(fine)
+        self._unit_balance = lift / self._resultant(lift)[1]
+
+    def respond(self, pressures: xr.Dataset) -> xr.Dataset:
+        ordered = check_pressures(pressures)
+        theta = np.radians(ordered["theta"].values.astype(float))
+        times = ordered["time"].values
+        shear = ordered["soil_shear"].values.astype(float)
+        loads, balanced = self._loads(theta, ordered["soil_pressure"] + ordered["water_pressure"], shear)
+        self._refuse_unbalanced(loads, times)
+        displacements = self._displacements(loads, times)
+        springs = np.stack([self._equilibrium.spring_forces(row)[0].ravel() for row in displacements])
+        fields = {"balanced_uplift": balanced}
+        fields |= self._internal_forces(displacements)
+        fields |= self._joints(displacements)
+        fields |= self._balances(displacements, loads, springs)
+        fields["shear_moment_residual"] = self._shear_moment_residual(fields, theta, shear, springs)
+        fields |= self._movements(displacements)
+        return self._dataset(pressures, fields, times)
+
+    def _loads(self, theta, pressure, shear):
+        """Nodal forces of pressures and weight at every time, and the uplift balanced among them."""
+        by_pressure, by_shear = traction_operator(self.ring, self.mesh, theta)
+        loads = (by_pressure @ pressure.values.T.astype(float) + by_shear @ shear.T).T + self._weight
+        balanced = np.zeros(len(loads))
+        if self.ring.balance_uplift:
+            balanced = self._resultant(loads)[1]
+            loads = loads - balanced[:, None] * self._unit_balance
+        return loads, balanced
+
+    def _resultant(self, forces: np.ndarray) -> np.ndarray:
+        """Sums to the right and up, and clockwise couple about the axis over the radius, (3, ...) [N/m]."""
+        nodal = forces.reshape(*forces.shape[:-1], -1, 3)
+        sine, cosine = np.sin(self.mesh.node_angle), np.cos(self.mesh.node_angle)
+        radial, tangential, couple = nodal[..., 0], nodal[..., 1], nodal[..., 2]
+        return np.stack(
+            [
+                (radial * sine + tangential * cosine).sum(-1),
+                (radial * cosine - tangential * sine).sum(-1),
+                (tangential + couple / self.ring.centre_radius).sum(-1),
+            ]
+        )
+
+    def _magnitude(self, forces: np.ndarray) -> np.ndarray:
+        nodal = forces.reshape(*forces.shape[:-1], -1, 3)
+        return np.hypot(nodal[..., 0], nodal[..., 1]).sum(-1)
+
+    def _refuse_unbalanced(self, loads, times):
+        """Refuse what nothing carries: any resultant of a free ring, a torque where the soil does not resist
+        sliding."""
+        ground = self.ring.ground
+        if self.ring.support == "invert" or (ground is not None and ground.tangential_springs):
+            return
+        resultant = np.abs(self._resultant(loads))
+        if ground is not None:
+            resultant[:2] = 0
+        excess = resultant.max(0) > BALANCE_TOLERANCE * self._magnitude(loads)
+        if excess.any():
+            first = int(np.argmax(excess))
+            horizontal, vertical, torque = self._resultant(loads[first])
+            remedy = (
+                "give the ring a ground, balance_uplift or support='invert'"
+                if ground is None
+                else "switch tangential_springs on"
+            )
+            raise ValueError(
+                f"ring: loads must balance where nothing carries their sum, got {horizontal:.6g} N/m to the right,"
+                f" {vertical:.6g} N/m up, torque/radius {torque:.6g} N/m at time {times[first]:g} s; {remedy}"
+            )
+
+    def _displacements(self, loads, times):
+        displacements = np.zeros_like(loads)
+        start = np.zeros(loads.shape[1])
+        for index, load in enumerate(loads):
+            try:
+                start = self._equilibrium.solve(load, start)
+            except NoEquilibrium as problem:
+                horizontal, vertical, _ = self._resultant(load)
+                raise LiningFailure(
+                    f"ring: no equilibrium at time {times[index]:g} s (loads sum to {horizontal:.4g} N/m to the right,"
+                    f" {vertical:.4g} N/m up): {problem}",
+                    float(times[index]),
+                ) from problem
+            displacements[index] = start
+        return displacements
+
+    def _internal_forces(self, displacements):
+        unknowns = displacements[:, self.mesh.element_unknowns()]
+        axial, shear, first, second = np.einsum("eij,tej->ite", self._element_forces, unknowns)
+        return {"axial_force": axial, "shear_force": shear, "bending_moment": (first + second) / 2}
+
+    def _joints(self, displacements):
+        unknowns = displacements[:, self.mesh.joint_unknowns()]
+        opening, dislocation, rotation = np.einsum("ij,tkj->itk", self._joint_jumps, unknowns)
+        forces = self._forces_at_joints(displacements)
+        return {
+            "joint_opening": opening,
+            "joint_dislocation": dislocation,
+            "joint_rotation": rotation,
+            "joint_axial_force": forces[0],
+            "joint_shear_force": forces[1],
+            "joint_bending_moment": forces[2],
+        }
+
+    def _forces_at_joints(self, displacements):
+        """Axial and shear force and moment of the joint springs, also where a stiffness is zero."""
+        stiffness = np.array(
+            [
+                -self.ring.joint_normal_stiffness,
+                self.ring.joint_shear_stiffness,
+                self.ring.joint_rotational_stiffness,
+            ]
+        )
+        unknowns = displacements[:, self.mesh.joint_unknowns()]
+        return np.einsum("i,ij,tkj->itk", stiffness, self._joint_jumps, unknowns)
+
+    def _balances(self, displacements, loads, springs):
+        reactions = springs.copy()
+        held = self._equilibrium.held
+        internal = (self._equilibrium.stiffness @ displacements.T).T
+        reactions[:, held] += (internal - loads - springs)[:, held]
+        load_sum, reaction_sum = self._resultant(loads), self._resultant(reactions)
+        gap = np.abs(load_sum + reaction_sum).max(0)
+        node_gap = np.abs(loads + reactions - internal).max(1)
+        return {
+            "load_sum_horizontal": load_sum[0],
+            "load_sum_vertical": load_sum[1],
+            "spring_sum_horizontal": reaction_sum[0],
+            "spring_sum_vertical": reaction_sum[1],
+            "equilibrium_residual": np.maximum(gap, node_gap) / np.maximum(self._magnitude(loads), 1e-300),
+        }
+
+    def _shear_moment_residual(self, fields, theta, shear, springs):
+        """Largest |Q + dM/ds + couple| at the nodes, from the reported forces: checks results, not matrices.
+
+        The couple per arc of the centre line is what the shear and the tangential soil springs on the outer face bring.
+        """
+        mesh, ring = self.mesh, self.ring
+        order = np.argsort(mesh.mid_angle)
+        span, angle = mesh.span[order], mesh.mid_angle[order] + mesh.span[order] / 2
+        moment, force = fields["bending_moment"][:, order], fields["shear_force"][:, order]
+        following = np.roll(np.arange(len(order)), -1)
+        arc = ring.centre_radius * (span + span[following]) / 2
+        weight = span / (span + span[following])
+        mean_shear = weight * force + (1 - weight) * force[:, following]
+        around = np.concatenate([theta - 2 * np.pi, theta, theta + 2 * np.pi])
+        traction = np.stack([np.interp(angle % (2 * np.pi), around, np.tile(row, 3)) for row in shear])
+        lever = ring.thickness / 2 * ring.outer_radius / ring.centre_radius
+        couple_of_node = springs.reshape(len(springs), -1, 3)[:, :, 2]
+        first, second = mesh.first[order], mesh.second[order]
+        spring_couple = couple_of_node[:, second] + np.where(
+            second == first[following], 0, couple_of_node[:, first[following]]
+        )
+        gap = mean_shear + (moment[:, following] - moment) / arc + lever * traction + spring_couple / arc
+        if ring.support == "invert":
+            # The clamp's own couple is concentrated there.
+            gap[:, np.abs(angle % (2 * np.pi) - mesh.node_angle[self._invert] % (2 * np.pi)) < 1e-9] = 0
+        return np.abs(gap).max(1)
+
+    def _movements(self, displacements):
+        """Displacements at the middle of the elements, change of the diameters, settlement.
+
+        A ring that nothing holds has no place of its own: its mean movement is taken out.
+        """
+        mesh = self.mesh
+        nodal = displacements.reshape(len(displacements), -1, 3)
+        sine, cosine, share = np.sin(mesh.node_angle), np.cos(mesh.node_angle), mesh.node_span / (2 * np.pi)
+        radial, tangential = nodal[..., 0], nodal[..., 1]
+        right = ((radial * sine + tangential * cosine) * share).sum(1, keepdims=True)
+        up = ((radial * cosine - tangential * sine) * share).sum(1, keepdims=True)
+        if self.ring.ground is None and self.ring.support == "free":
+            radial = radial - right * sine - up * cosine
+            tangential = tangential - right * cosine + up * sine
+            tangential = tangential - (tangential * share).sum(1, keepdims=True)
+            up = np.zeros_like(up)
+        crown, right_waist, invert, left_waist = (self._radial_at(radial, quarter * np.pi / 2) for quarter in range(4))
+        lean = mesh.span / 2
+        first_w, second_w = radial[:, mesh.first], radial[:, mesh.second]
+        first_v, second_v = tangential[:, mesh.first], tangential[:, mesh.second]
+        return {
+            "displacement_radial": ((first_w + second_w) * np.cos(lean) + (first_v - second_v) * np.sin(lean)) / 2,
+            "displacement_tangential": ((first_v + second_v) * np.cos(lean) + (second_w - first_w) * np.sin(lean)) / 2,
+            "convergence_horizontal": -(right_waist + left_waist),
+            "convergence_vertical": -(crown + invert),
+            "settlement": -up[:, 0],
+        }
+
+    def _radial_at(self, radial, angle):
+        """Radial displacement at an angle [rad], linear in the element; the mean of both sides on a joint."""
+        mesh = self.mesh
+        sides = []
+        for nudge in (-1e-9, 1e-9):
+            along = (angle + nudge - mesh.node_angle[mesh.first]) % (2 * np.pi)
+            element = int(np.argmax(along <= mesh.span))
+            share = along[element] / mesh.span[element]
+            sides.append(radial[:, mesh.first[element]] * (1 - share) + radial[:, mesh.second[element]] * share)
+        return (sides[0] + sides[1]) / 2
+
+    def _dataset(self, pressures, fields, times):
+        degrees = np.degrees(self.mesh.mid_angle) % 360
+        order = np.argsort(degrees)
+        per_element = ("axial_force", "shear_force", "bending_moment", "displacement_radial", "displacement_tangential")
+        fields |= {name: fields[name][:, order] for name in per_element}
+        joints = np.array(self.ring.joint_angles, dtype=float)
+        coordinates = {
+            "time": ("time", times),
+            "theta": ("theta", np.round(degrees[order], 10)),
+            "joint": ("joint", np.arange(1, len(joints) + 1)),
+            "joint_angle": ("joint", joints),
+        }
+        attributes = {
+            "Conventions": "CF-1.11",
+            "title": "response of the lining: beam-spring model",
+            "model": "beam-spring",
+            "ring": self.ring.model_dump_json(),
+        }
+        if self.ring.ground is not None:
+            normal, tangential = limit_pressures(self.ring.ground)
+            attributes["limit_pressures"] = f"normal {normal:.6g} Pa, tangential {tangential:.6g} Pa"
+        response = response_dataset(fields, coordinates, attributes)
+        response["time"].attrs |= pressures["time"].attrs
+        half = np.degrees(self.mesh.span[order]) / 2
+        centre = response["theta"].values
+        response["theta"].attrs["bounds"] = "theta_bnds"
+        response = response.assign_coords(theta_bnds=(("theta", "bounds"), np.stack([centre - half, centre + half], 1)))
+        if "inflow_mass" in pressures:
+            response["inflow_mass"] = pressures["inflow_mass"]
+        return response

@@ -1,0 +1,153 @@
+"""What every lining model takes and gives: input checks, response variables with units, and the sign conventions.
+
+Signs, in one place:
+
+- Angles theta run clockwise from the crown; s is the arc length of the centre line in that direction.
+- Soil and water pressure push inward; soil shear positive drags the lining clockwise. All act on the outer face.
+- N compression positive; M positive with tension on the outer face; Q = -dM/ds - m, with m the clockwise couple per
+  arc that
+  shear on the outer face brings half a thickness from the centre line: Q positive where the part at larger s pushes
+  the part at smaller s inward.
+- Radial displacement outward, tangential displacement and rotation clockwise positive.
+- Joint opening positive for a gap; N = -k_n opening. Joint rotation positive when the joint opens on the outside;
+  M = k_theta rotation. Joint dislocation positive when the clockwise segment steps inward; Q = k_s dislocation.
+- Convergence positive when the diameter shortens; settlement downward positive.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+import xarray as xr
+
+PRESSURES = ("soil_pressure", "water_pressure", "soil_shear")
+
+#: name: (dimensions, units, long name)
+RESPONSE = {
+    "axial_force": (("time", "theta"), "N m-1", "axial force per metre of tunnel, compression positive"),
+    "shear_force": (("time", "theta"), "N m-1", "shear force per metre of tunnel, Q = -dM/ds"),
+    "bending_moment": (("time", "theta"), "N m m-1", "bending moment per metre of tunnel, tension outside positive"),
+    "displacement_radial": (("time", "theta"), "m", "radial displacement of the lining, outward positive"),
+    "displacement_tangential": (("time", "theta"), "m", "tangential displacement of the lining, clockwise positive"),
+    "joint_axial_force": (("time", "joint"), "N m-1", "axial force in the joint, compression positive"),
+    "joint_shear_force": (("time", "joint"), "N m-1", "shear force in the joint, Q = -dM/ds"),
+    "joint_bending_moment": (("time", "joint"), "N m m-1", "bending moment in the joint, tension outside positive"),
+    "joint_opening": (("time", "joint"), "m", "joint opening on the centre line, gap positive"),
+    "joint_dislocation": (("time", "joint"), "m", "joint dislocation, clockwise segment inward positive"),
+    "joint_rotation": (("time", "joint"), "rad", "joint rotation, opening on the outside positive"),
+    "convergence_horizontal": (("time",), "m", "shortening of the horizontal diameter"),
+    "convergence_vertical": (("time",), "m", "shortening of the vertical diameter"),
+    "settlement": (("time",), "m", "mean downward displacement of the ring"),
+    "equilibrium_residual": (("time",), "1", "unbalanced force on the ring or a node over the sum of all nodal loads"),
+    "shear_moment_residual": (("time",), "N m-1", "largest departure from Q + dM/ds + couple of outer-face shear = 0"),
+    "load_sum_horizontal": (("time",), "N m-1", "horizontal sum of pressures, weight and balance, right positive"),
+    "load_sum_vertical": (("time",), "N m-1", "vertical sum of pressures, weight and balance, up positive"),
+    "spring_sum_horizontal": (("time",), "N m-1", "horizontal sum of soil springs and support, right positive"),
+    "spring_sum_vertical": (("time",), "N m-1", "vertical sum of soil springs and support, up positive"),
+    "balanced_uplift": (("time",), "N m-1", "vertical sum of pressures and weight balanced by radial soil pressure"),
+}
+
+#: name: (units, long name)
+COORDINATES = {
+    "time": ("s", "time since the gate opened"),
+    "theta": ("degree", "angle from the crown, clockwise"),
+    "joint": ("1", "joint number, clockwise from the crown"),
+    "joint_angle": ("degree", "angle of the joint from the crown, clockwise"),
+}
+
+
+class LiningFailure(RuntimeError):
+    """The ring found no equilibrium: a mechanism, or loads beyond what the ground can carry.
+
+    Attributes
+    ----------
+    time : float
+        Time of the record that failed [s].
+    """
+
+    def __init__(self, message: str, time: float):
+        super().__init__(message)
+        self.time = time
+
+
+class LiningModel(ABC):
+    """A structural model of the lining: pressures in, response out, one time after the other."""
+
+    @abstractmethod
+    def respond(self, pressures: xr.Dataset) -> xr.Dataset:
+        """Response of the lining to its pressures.
+
+        Parameters
+        ----------
+        pressures : xarray.Dataset
+            soil_pressure, water_pressure, soil_shear (time, theta) [Pa] on the outer face; theta [degree] in any
+            periodic
+            sampling, linear in between.
+
+        Returns
+        -------
+        xarray.Dataset
+            The variables of :data:`RESPONSE`, with ``inflow_mass`` (time) carried along where it is given.
+
+        Raises
+        ------
+        ValueError
+            The pressures are not what the schema asks for, or cannot be carried without a support.
+        LiningFailure
+            No equilibrium at some time.
+        """
+
+
+def check_pressures(pressures: xr.Dataset) -> xr.Dataset:
+    """The three pressure variables, (time, theta), angles ascending; or a message with rule, name, value and remedy."""
+    missing = [name for name in PRESSURES if name not in pressures]
+    if missing:
+        raise ValueError(
+            f"pressures: {', '.join(missing)} must be given, got {sorted(map(str, pressures.data_vars))};"
+            " add zeros for an action that is absent"
+        )
+    for name in PRESSURES:
+        variable = pressures[name]
+        if set(variable.dims) != {"time", "theta"}:
+            raise ValueError(
+                f"pressures: {name} must have the dimensions (time, theta), got {variable.dims};"
+                " select one tunnel, or expand_dims(time=[0.0]) for a single state"
+            )
+        units = variable.attrs.get("units", "Pa")
+        if units != "Pa":
+            raise ValueError(f"pressures: {name} must be in Pa, got {units!r}; convert it")
+        bad = int((~np.isfinite(variable.values)).sum())
+        if bad:
+            raise ValueError(f"pressures: {name} must be finite, got {bad} values that are not; drop those times")
+    for name in ("time", "theta"):
+        if name not in pressures.coords:
+            raise ValueError(f"pressures: coordinate {name} must be given, got none; assign_coords({name}=...)")
+    if pressures.sizes["time"] == 0:
+        raise ValueError("pressures: time must have at least one record, got none; wait for the first output")
+    ordered = pressures[list(PRESSURES)].transpose("time", "theta").sortby("theta")
+    theta = ordered["theta"].values
+    if len(theta) < 8 or theta[0] < 0 or theta[-1] >= 360 or np.diff(theta).min() <= 0:
+        raise ValueError(
+            f"pressures: theta must hold at least 8 different angles in [0, 360) degrees, got {len(theta)} between"
+            f" {theta[0]:g} and {theta[-1]:g}; take them modulo 360 and drop the repeated one"
+        )
+    return ordered
+
+
+def response_dataset(
+    fields: dict[str, np.ndarray], coordinates: dict[str, tuple[str, np.ndarray]], attributes: dict[str, str]
+) -> xr.Dataset:
+    """Response with the schema's dimensions, units and names.
+
+    fields : name of :data:`RESPONSE` to array;  coordinates : name to (dimension, array).
+    """
+    variables = {}
+    for name, values in fields.items():
+        dimensions, units, long_name = RESPONSE[name]
+        variables[name] = (dimensions, values, {"units": units, "long_name": long_name})
+    axes = {}
+    for name, (dimension, values) in coordinates.items():
+        units, long_name = COORDINATES[name]
+        axes[name] = (dimension, values, {"units": units, "long_name": long_name})
+    return xr.Dataset(variables, coords=axes, attrs=attributes)

@@ -1,0 +1,178 @@
+"""The ring as it is built: geometry, segments, joints, concrete and the ground around it (validated input)."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+
+class Ground(BaseModel):
+    """Soil around the ring, as the soil springs see it.
+
+    Parameters
+    ----------
+    youngs_modulus : float
+        [Pa]. Decides the initial spring stiffness, Eq. (8).
+    poissons_ratio : float
+        [-], 0 to below 0.5.
+    cohesion : float
+        Effective cohesion [Pa].
+    friction_angle : float
+        [degree].
+    vertical_stress, horizontal_stress : float
+        Effective stresses at the depth of the axis [Pa], compression positive. Decide the limit pressures.
+    limit_pressure_normal, limit_pressure_tangential : float, optional
+        Limit of the springs' reaction [Pa]; given, they replace the formula
+        (:func:`structure.springs.limit_pressures`).
+    tangential_springs : bool
+        Whether the soil resists sliding with a third of the normal stiffness.
+    slip_at : {"outer_face", "centre_line"}
+        Where the tangential springs take hold. "outer_face": where the soil is; a rotating section slips there too,
+        and the
+        reaction brings a couple. "centre_line": at the beam nodes, as load-structure programs usually do.
+    law : {"hyperbolic", "linear"}
+        Reaction over displacement: Eq. (7), or its initial tangent without a limit.
+    two_way : bool
+        Whether normal springs also pull. Off by default: a two-way spring pulls a shrinking ring outward.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    youngs_modulus: float = Field(gt=0)
+    poissons_ratio: float = Field(ge=0, lt=0.5)
+    cohesion: float = Field(ge=0)
+    friction_angle: float = Field(ge=0, lt=90)
+    vertical_stress: float = Field(ge=0)
+    horizontal_stress: float = Field(ge=0)
+    limit_pressure_normal: float | None = Field(default=None, ge=0)
+    limit_pressure_tangential: float | None = Field(default=None, ge=0)
+    tangential_springs: bool = True
+    slip_at: Literal["outer_face", "centre_line"] = "outer_face"
+    law: Literal["hyperbolic", "linear"] = "hyperbolic"
+    two_way: bool = False
+
+
+class Ring(BaseModel):
+    """A ring of segments, one metre of tunnel.
+
+    Parameters
+    ----------
+    outer_diameter, inner_diameter : float
+        [m].
+    concrete_modulus : float
+        Young's modulus [Pa]; the ring uses the plane strain modulus E/(1 - nu^2).
+    concrete_poissons_ratio : float
+        [-].
+    concrete_unit_weight : float
+        [N/m3]; 0 leaves self-weight out.
+    joint_angles : tuple of float
+        Longitudinal joints [degree] from the crown, clockwise. Empty: a homogeneous ring.
+    joint_rotational_stiffness : float
+        [N m/rad] per metre of tunnel.
+    joint_normal_stiffness, joint_shear_stiffness : float
+        [N/m] per metre of tunnel, that is N/m2: the whole joint, not per area of its face. Spread over the face it is
+        k_n/t, so that the face alone would give the rotational stiffness k_n t^2/12.
+    ground : Ground or None
+        None: no soil springs; then loads and weight must balance, or `support` must carry the difference.
+    balance_uplift : bool
+        A lining held fixed while its pressures are taken carries their vertical resultant (buoyancy less weight).
+        True: that
+        resultant is balanced at every time by a radial soil pressure a cos(theta) on the outer face, as much more
+        at the
+        crown as less at the invert. False: soil springs (or the support) carry it.
+    support : {"free", "invert"}
+        "invert": the ring is clamped at the node next to its invert, as in a test stand. "free": only the ground
+        holds it.
+    n_elements : int
+        Straight beam elements around the ring.
+    section : {"timoshenko", "euler-bernoulli"}
+        With or without shear deformation.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    outer_diameter: float = Field(gt=0)
+    inner_diameter: float = Field(gt=0)
+    concrete_modulus: float = Field(gt=0)
+    concrete_poissons_ratio: float = Field(ge=0, lt=0.5)
+    concrete_unit_weight: float = Field(ge=0)
+    joint_angles: tuple[float, ...] = ()
+    joint_rotational_stiffness: float = Field(default=0.0, ge=0)
+    joint_normal_stiffness: float = Field(default=0.0, ge=0)
+    joint_shear_stiffness: float = Field(default=0.0, ge=0)
+    ground: Ground | None = None
+    balance_uplift: bool = False
+    support: Literal["free", "invert"] = "free"
+    n_elements: int = Field(default=360, ge=24, le=20000)
+    section: Literal["timoshenko", "euler-bernoulli"] = "timoshenko"
+
+    @model_validator(mode="after")
+    def _check(self) -> Ring:
+        if self.inner_diameter >= self.outer_diameter:
+            raise ValueError(
+                f"inner_diameter must be below outer_diameter {self.outer_diameter:g} m, got {self.inner_diameter:g} m;"
+                " swap them if they were exchanged"
+            )
+        for angle in self.joint_angles:
+            if not 0 <= angle < 360:
+                raise ValueError(f"joint_angles must lie in [0, 360) degrees, got {angle:g}; add or subtract 360")
+        smallest = 2 * 360 / self.n_elements
+        if list(self.joint_angles) != sorted(self.joint_angles) or min(self.segment_angles) < smallest:
+            raise ValueError(
+                f"joint_angles must increase by at least two elements ({smallest:g} degrees), got {self.joint_angles};"
+                " sort them, or raise n_elements"
+            )
+        stiffnesses = {"joint_rotational_stiffness", "joint_normal_stiffness", "joint_shear_stiffness"}
+        missing = sorted(stiffnesses - self.model_fields_set)
+        if self.joint_angles and missing:
+            raise ValueError(f"joints need {', '.join(missing)}, got none; state them, 0 for a free hinge")
+        if self.support == "invert" and self.ground is not None:
+            raise ValueError("support must be 'free' where there is ground, got 'invert'; remove one of the two")
+        return self
+
+    @property
+    def thickness(self) -> float:
+        """Segment thickness [m]."""
+        return (self.outer_diameter - self.inner_diameter) / 2
+
+    @property
+    def outer_radius(self) -> float:
+        """Radius of the outer face, where soil and water act [m]."""
+        return self.outer_diameter / 2
+
+    @property
+    def centre_radius(self) -> float:
+        """Radius of the centre line, where the beams lie [m]."""
+        return (self.outer_diameter + self.inner_diameter) / 4
+
+    @property
+    def segment_angles(self) -> tuple[float, ...]:
+        """Angle from each joint to the next, clockwise [degree]; 360 where there are no joints."""
+        angles = self.joint_angles
+        if not angles:
+            return (360.0,)
+        return tuple(b - a for a, b in zip(angles, (*angles[1:], angles[0] + 360.0), strict=True))
+
+    @property
+    def plane_strain_modulus(self) -> float:
+        """E/(1 - nu^2) [Pa]: a tunnel cannot widen along its axis."""
+        return self.concrete_modulus / (1 - self.concrete_poissons_ratio**2)
+
+    @property
+    def axial_stiffness(self) -> float:
+        """EA per metre of tunnel [N/m]."""
+        return self.plane_strain_modulus * self.thickness
+
+    @property
+    def bending_stiffness(self) -> float:
+        """EI per metre of tunnel [N m2/m]."""
+        return self.plane_strain_modulus * self.thickness**3 / 12
+
+    @property
+    def shear_stiffness(self) -> float:
+        """G A_s per metre of tunnel [N/m], rectangular section (5/6); infinite for Euler-Bernoulli."""
+        if self.section == "euler-bernoulli":
+            return math.inf
+        return 5 / 6 * self.concrete_modulus / (2 * (1 + self.concrete_poissons_ratio)) * self.thickness

@@ -1,0 +1,118 @@
+"""Laws of the springs: soil reaction over displacement, with its limit and tangent; joint faces."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from structure.ring import Ground, Ring
+
+#: Ratio of tangential to normal stiffness, stated with Eq. (8) by Xie et al.
+TANGENTIAL_TO_NORMAL = 1 / 3
+
+
+class SoilSpring(NamedTuple):
+    """One soil spring law per area of the outer face.
+
+    stiffness : initial stiffness eta_0 [Pa/m];  limit : p_lim [Pa], inf for a linear law;
+    pulls : whether the reaction also exists at negative displacement.
+    """
+
+    stiffness: float
+    limit: float
+    pulls: bool
+
+
+class JointSpring(NamedTuple):
+    """Joint stiffness per metre of tunnel: normal, shear [N/m2], rotation [N m/rad/m]."""
+
+    normal: float
+    shear: float
+    rotation: float
+
+
+def limit_pressures(ground: Ground) -> tuple[float, float]:
+    """Limit reaction of the soil, normal and tangential to the lining [Pa].
+
+    p_n = 2 c cos(phi)/(1 - sin(phi)) + (1 + sin(phi))/(1 - sin(phi)) ds,  ds = (s_h + s_v)/2 nu/(1 - nu);
+    p_t = (s_h + s_v)/2 tan(phi).
+
+    Source: Do et al. (2014), hyperstatic reaction method, *as usually quoted*. The primary source could not be
+    opened to
+    check it, so limits measured or agreed for a site belong into ``Ground.limit_pressure_normal`` and
+    ``Ground.limit_pressure_tangential``, which win.
+    """
+    sin_phi = math.sin(math.radians(ground.friction_angle))
+    cos_phi = math.cos(math.radians(ground.friction_angle))
+    mean_stress = (ground.horizontal_stress + ground.vertical_stress) / 2
+    confinement = mean_stress * ground.poissons_ratio / (1 - ground.poissons_ratio)
+    normal = (2 * ground.cohesion * cos_phi + (1 + sin_phi) * confinement) / (1 - sin_phi)
+    tangential = mean_stress * sin_phi / cos_phi
+    if ground.limit_pressure_normal is not None:
+        normal = ground.limit_pressure_normal
+    if ground.limit_pressure_tangential is not None:
+        tangential = ground.limit_pressure_tangential
+    return normal, tangential
+
+
+def soil_springs(ring: Ring) -> tuple[SoilSpring, SoilSpring]:
+    """Normal and tangential soil spring of a ring with ground.
+
+    Initial stiffness eta_0 = 4/(1 + nu) E/D with the outer diameter D. Source: Xie et al., Eq. (8).
+    """
+    ground = ring.ground
+    if ground is None:
+        raise ValueError("ring: soil springs need a ground, got None; give ring.ground")
+    normal_limit, tangential_limit = limit_pressures(ground)
+    if ground.law == "linear":
+        normal_limit = tangential_limit = math.inf
+    stiffness = 4 / (1 + ground.poissons_ratio) * ground.youngs_modulus / ring.outer_diameter
+    share = TANGENTIAL_TO_NORMAL if ground.tangential_springs else 0.0
+    return (
+        SoilSpring(stiffness, normal_limit, ground.two_way),
+        SoilSpring(share * stiffness, tangential_limit, True),
+    )
+
+
+def joint_spring(ring: Ring) -> JointSpring:
+    """Springs of one joint per metre of tunnel: normal, shear and rotational."""
+    return JointSpring(
+        ring.joint_normal_stiffness,
+        ring.joint_shear_stiffness,
+        ring.joint_rotational_stiffness,
+    )
+
+
+def soil_reaction(displacement: np.ndarray, spring: SoilSpring) -> tuple[np.ndarray, np.ndarray]:
+    """Reaction of the soil and its derivative. The reaction never falls with d, so that Newton cannot cycle.
+
+    p = eta_0 d p_lim/(p_lim + eta_0 d), odd in d where the spring pulls, else zero for d < 0.
+
+    Parameters
+    ----------
+    displacement : (n,) float64
+        d [m], positive into the soil (normal) or clockwise (tangential).
+    spring : SoilSpring
+
+    Returns
+    -------
+    reaction : (n,) float64
+        [Pa], against the displacement.
+    tangent : (n,) float64
+        dp/dd [Pa/m]; at d = 0 the initial stiffness.
+
+    Source: Xie et al., Eq. (7).
+    """
+    stiffness, limit, pulls = spring
+    if limit == 0 or stiffness == 0:
+        zero = np.zeros_like(displacement)
+        return zero, zero
+    ratio = stiffness * np.abs(displacement) / limit
+    reaction = stiffness * displacement / (1 + ratio)
+    tangent = stiffness / (1 + ratio) ** 2
+    if not pulls:
+        open_gap = displacement < 0
+        reaction, tangent = np.where(open_gap, 0.0, reaction), np.where(open_gap, 0.0, tangent)
+    return reaction, tangent

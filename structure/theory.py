@@ -1,0 +1,223 @@
+"""Closed forms for rings, and the pressures that theory expects on a tunnel before it leaks.
+
+Signs as in :mod:`structure.lining`. Thin ring of centre-line radius R, inextensible and without shear deformation
+unless said
+otherwise; here theta is in radians from the crown, clockwise, except in :func:`theoretical_pressures` (degrees).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+class RingForces(NamedTuple):
+    """Internal forces per metre of tunnel: axial and shear force [N/m], bending moment [N m/m]."""
+
+    axial_force: np.ndarray
+    shear_force: np.ndarray
+    bending_moment: np.ndarray
+
+
+def uniform_pressure(pressure: float, radius: float, theta: np.ndarray) -> RingForces:
+    """Forces under a uniform inward pressure [Pa]: N = p R, no moment."""
+    zero = np.zeros_like(theta)
+    return RingForces(zero + pressure * radius, zero, zero)
+
+
+def radial_cos2(pressure: float, radius: float, theta: np.ndarray) -> RingForces:
+    """Forces under an inward pressure p cos(2 theta): M = -p R^2/3 cos(2 theta), from equilibrium alone."""
+    return RingForces(
+        -pressure * radius / 3 * np.cos(2 * theta),
+        -2 / 3 * pressure * radius * np.sin(2 * theta),
+        -pressure * radius**2 / 3 * np.cos(2 * theta),
+    )
+
+
+def radial_cos2_displacement(
+    pressure: float,
+    radius: float,
+    bending_stiffness: float,
+    axial_stiffness: float = np.inf,
+    shear_stiffness: float = np.inf,
+) -> float:
+    """Outward displacement [m] at the crown under p cos(2 theta): -p R^4/(9 EI), and stretching and shear if asked for.
+
+    Castigliano on the forces of :func:`radial_cos2`: every force adds (amplitude)^2/stiffness to the energy.
+    """
+    return -pressure * radius**2 / 9 * (radius**2 / bending_stiffness + 1 / axial_stiffness + 4 / shear_stiffness)
+
+
+def tangential_sin2(shear: float, radius: float, theta: np.ndarray) -> RingForces:
+    """Forces under a shear t sin(2 theta) on the centre line, directed from crown and invert to the springline."""
+    return RingForces(
+        -2 / 3 * shear * radius * np.cos(2 * theta),
+        -1 / 3 * shear * radius * np.sin(2 * theta),
+        -shear * radius**2 / 6 * np.cos(2 * theta),
+    )
+
+
+def distributed_couple_sin2(couple: float, radius: float, theta: np.ndarray) -> RingForces:
+    """Forces under a clockwise couple m sin(2 theta) [N m per metre of arc and of tunnel].
+
+    No force acts, so dQ/dtheta = N and dN/dtheta = -Q leave no second harmonic in N and Q; dM/ds = -Q - m then gives
+    M = m R/2 cos(2 theta). A shear t on the outer face, half a thickness from the centre line, brings m = t
+    thickness/2.
+    """
+    zero = np.zeros_like(theta)
+    return RingForces(zero, zero, couple * radius / 2 * np.cos(2 * theta))
+
+
+def winkler_cos2_displacement(
+    pressure: float,
+    shear: float,
+    radius: float,
+    bending_stiffness: float,
+    normal_stiffness: float,
+    tangential_stiffness: float,
+    thickness: float = 0.0,
+) -> float:
+    """Outward displacement [m] at the crown in two-way linear springs [Pa/m] under p cos(2 theta) and t sin(2 theta).
+
+    w = -(p + t/2)/(9 EI/R^4 + k_r + k_t/4). With a thickness, tractions and springs act on the outer face, half of
+    it outside
+    R: areas grow by 1 + thickness/(2 R), and the slip there is 1 - 3 thickness/(2 R) of the centre line's, for the
+    section
+    rotates by 3 w sin(2 theta)/(2 R) against a slip of -w sin(2 theta)/2.
+    """
+    area = 1 + thickness / (2 * radius)
+    slip = 1 - 3 * thickness / (2 * radius)
+    load = area * (pressure + slip * shear / 2)
+    springs = area * (normal_stiffness + slip**2 * tangential_stiffness / 4)
+    return -load / (9 * bending_stiffness / radius**4 + springs)
+
+
+def self_weight_on_point_support(weight: float, radius: float, theta: np.ndarray) -> RingForces:
+    """Forces in a ring of weight g [N/m2, per arc and tunnel length] standing on its invert, theta in [0, pi].
+
+    M = -g R^2 (1 - cos(theta)/2 - theta sin(theta)): -g R^2/2 at the crown, -3/2 g R^2 at the invert.
+    """
+    return RingForces(
+        weight * radius * (theta * np.sin(theta) - np.cos(theta) / 2),
+        -weight * radius * (np.sin(theta) / 2 + theta * np.cos(theta)),
+        -weight * radius**2 * (1 - np.cos(theta) / 2 - theta * np.sin(theta)),
+    )
+
+
+def opposite_point_loads(load: float, radius: float, theta: np.ndarray) -> RingForces:
+    """Forces under two inward loads P [N/m] at crown and invert, theta in (0, pi): M = -P R/pi under the loads."""
+    return RingForces(
+        load / 2 * np.sin(theta),
+        -load / 2 * np.cos(theta),
+        load * radius * (np.sin(theta) / 2 - 1 / np.pi),
+    )
+
+
+def hinge_moments(
+    rigid_moments: np.ndarray, rotational_stiffness: float, radius: float, bending_stiffness: float
+) -> np.ndarray:
+    """Moments at the n elastic hinges of a doubly symmetric ring under doubly symmetric load.
+
+    M_j = M0_j + X, X = -sum(M0_j/k)/(2 pi R/EI + n/k), with M0 the ring's moments without hinges: the rotations
+    must close.
+
+    rigid_moments : (n,) float64 [N m/m];  rotational_stiffness : k [N m/rad/m].
+    """
+    release = np.sum(rigid_moments) / rotational_stiffness
+    flexibility = 2 * np.pi * radius / bending_stiffness + len(rigid_moments) / rotational_stiffness
+    return rigid_moments - release / flexibility
+
+
+def einstein_schwartz_full_slip_moment(stress_ratio: float, poissons_ratio: float, flexibility_ratio: float) -> float:
+    """Largest M/(P R^2) of a lining that slips freely in elastic ground, P the overburden stress.
+
+    (1 - K)/2 3 (3 - 4 nu)/(F (1 - nu) + 3 (5 - 6 nu)), F = E R^3 (1 - nu_l^2)/(E_l I (1 - nu^2)).
+    Source: Einstein & Schwartz (1979).
+    """
+    nu = poissons_ratio
+    return (1 - stress_ratio) / 2 * 3 * (3 - 4 * nu) / (flexibility_ratio * (1 - nu) + 3 * (5 - 6 * nu))
+
+
+def theoretical_pressures(
+    *,
+    outer_diameter: float,
+    cover: float,
+    buoyant_unit_weight: float,
+    coefficient_at_rest: float,
+    water_unit_weight: float = 9810.0,
+    water_table_depth: float = 0.0,
+    unit_weight_above_water: float | None = None,
+    shear: bool = True,
+    theta: np.ndarray | None = None,
+) -> xr.Dataset:
+    """Geostatic and hydrostatic pressures on an undisturbed circle, as a pressures dataset of one time.
+
+    Effective stresses s_v from the overburden and s_h = K0 s_v meet the circle with the normal s_v cos^2 + s_h
+    sin^2 and the
+    shear (s_v - s_h) sin cos.
+
+    Parameters
+    ----------
+    outer_diameter, cover : float
+        [m]; cover from the surface to the crown.
+    buoyant_unit_weight, water_unit_weight : float
+        [N/m3].
+    coefficient_at_rest : float
+        K0 [-]; nu/(1 - nu) for an elastic ground under its own weight.
+    water_table_depth : float
+        [m] below the surface, 0 to the cover.
+    unit_weight_above_water : float, optional
+        [N/m3], needed where the water table is below the surface.
+    shear : bool
+        False: a frictionless lining, no tangential traction.
+    theta : (n,) float64, optional
+        [degree]; every degree if left out.
+
+    Returns
+    -------
+    xarray.Dataset
+        soil_pressure, water_pressure, soil_shear (time, theta) [Pa].
+    """
+    import xarray as xr
+
+    if not 0 <= water_table_depth <= cover:
+        raise ValueError(
+            f"theoretical_pressures: water_table_depth must lie in [0, cover = {cover:g}] m, got {water_table_depth:g};"
+            " a table below the crown or above the ground is beyond this formula"
+        )
+    if water_table_depth > 0 and unit_weight_above_water is None:
+        raise ValueError(
+            "theoretical_pressures: unit_weight_above_water is needed for a water table below the surface, got none"
+        )
+    theta = np.arange(0.0, 360.0, 1.0) if theta is None else np.asarray(theta, dtype=float)
+    angle = np.radians(theta)
+    depth_below_table = cover + outer_diameter / 2 * (1 - np.cos(angle)) - water_table_depth
+    above_table = 0.0 if unit_weight_above_water is None else unit_weight_above_water * water_table_depth
+    vertical = above_table + buoyant_unit_weight * depth_below_table
+    horizontal = coefficient_at_rest * vertical
+    fields = {
+        "soil_pressure": (
+            vertical * np.cos(angle) ** 2 + horizontal * np.sin(angle) ** 2,
+            "effective soil pressure on the lining",
+        ),
+        "water_pressure": (water_unit_weight * depth_below_table, "water pressure on the lining"),
+        "soil_shear": (
+            (vertical - horizontal) * np.sin(angle) * np.cos(angle) * float(shear),
+            "soil shear on the lining, clockwise positive",
+        ),
+    }
+    return xr.Dataset(
+        {
+            name: (("time", "theta"), values[None], {"units": "Pa", "long_name": long_name})
+            for name, (values, long_name) in fields.items()
+        },
+        coords={
+            "time": ("time", [0.0], {"units": "s", "long_name": "time since the gate opened"}),
+            "theta": ("theta", theta, {"units": "degree", "long_name": "angle from the crown, clockwise"}),
+        },
+        attrs={"title": "theoretical pressures: overburden with K0, hydrostatic water"},
+    )
