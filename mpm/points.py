@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from mpm.jit import kernel
-from mpm.variables import MASS, POINT_WIDTH, SXX, SYY, SZZ, X0, Y0, C_RETURNED, N, P, X, Y
+from mpm.variables import C_RETURNED, MASS, POINT_WIDTH, SXX, SYY, SZZ, X0, Y0, N, P, X, Y
 
 
 def barycentric_layout(count):

@@ -456,7 +456,7 @@ def outflow_nodes(scene, mesh):
 
 
 def element_neighbours(mesh, outflow):
-    """Element across the edge opposite each corner; -1 at a wall, -2 at the outflow of a sink: (n_elements, 3) int32."""
+    """Element across the edge opposite each corner: (n_elements, 3) int32; -1 at a wall, -2 at an outflow."""
     edges = {}
     neighbours = np.full((len(mesh.elements), 3), -1, np.int32)
     for e, corner in enumerate(mesh.elements.tolist()):
@@ -474,4 +474,3 @@ def element_neighbours(mesh, outflow):
         if a in outflow and b in outflow:
             neighbours[e, k] = -2
     return neighbours
-

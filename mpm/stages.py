@@ -182,7 +182,8 @@ def relax(solver, friction, tolerance, max_steps, progress=None):
     for step in range(1, max_steps + 1):
         s.over_elements(relax_elements, *layout, velocity, 1, per_range=(force,))
         s.over_nodes(
-            relax_nodes, force, held, held_liquid, mass, s.fixed, s.contact_of_node, s.normal, s.active, friction, velocity, reaction, per_range=(sums,),
+            relax_nodes, force, held, held_liquid, mass, s.fixed, s.contact_of_node, s.normal, s.active, friction,
+            velocity, reaction, per_range=(sums,),
         )  # fmt: skip
         energy, unbalanced, total = sums.sum(axis=0)
         residual = float(np.sqrt(unbalanced / total))

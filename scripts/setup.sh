@@ -1,0 +1,45 @@
+#!/usr/bin/env bash
+# What Python packages cannot bring: uv, and the system libraries that the gmsh wheel loads.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+gmsh_packages="libglu1-mesa libgl1 libxrender1 libxcursor1 libxft2 libxinerama1 libgomp1"
+
+missing_libraries() {
+    local library known
+    known="$(/sbin/ldconfig -p)"
+    for library in libGLU.so.1 libGL.so.1 libXrender.so.1 libXcursor.so.1 libXft.so.2 libXinerama.so.1 libgomp.so.1; do
+        [[ "$known" == *"$library"* ]] || echo -n "$library "
+    done
+}
+
+install_packages() {
+    local as_root=""
+    if [ "$(id -u)" != 0 ]; then
+        command -v sudo >/dev/null || { echo "type as root: apt-get install -y $*" >&2; exit 1; }
+        as_root="sudo"
+    fi
+    echo "installing system packages: $*" >&2
+    $as_root apt-get update -qq
+    $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+}
+
+if [ "$(uname)" = Linux ] && [ -n "$(missing_libraries)" ]; then
+    if ! command -v apt-get >/dev/null; then
+        echo "gmsh needs these system libraries: $(missing_libraries)" >&2
+        echo "install them with your package manager (Debian names: $gmsh_packages)" >&2
+        exit 1
+    fi
+    # shellcheck disable=SC2086
+    install_packages $gmsh_packages
+fi
+
+export PATH="$PWD/.uv/bin:$HOME/.local/bin:$PATH"
+if ! command -v uv >/dev/null; then
+    # A Debian Python comes without pip and venv; a folder of our own touches nothing else on the machine.
+    if ! python3 -c "import ensurepip, venv" 2>/dev/null && command -v apt-get >/dev/null; then
+        install_packages python3-venv
+    fi
+    python3 -m venv .uv
+    .uv/bin/pip install --quiet uv
+fi

@@ -1,0 +1,59 @@
+"""Which package may import which, and what a light import may load."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+FORBIDDEN = {
+    "mpm": {"structure", "coupling", "xarray", "matplotlib", "skfem", "h5netcdf"},
+    "structure": {"mpm", "coupling"},
+}
+HEAVY = ("numba", "xarray", "matplotlib", "scipy", "gmsh", "skfem", "pint", "dask", "distributed", "h5py", "meshio")
+
+
+def imported(path: Path) -> set[str]:
+    """Top-level packages a file imports anywhere, inside functions and by name too."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import, write it in full"
+            names.add((node.module or "").split(".")[0])
+        elif isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", "")) == "import_module":
+            names |= {str(a.value).split(".")[0] for a in node.args if isinstance(a, ast.Constant)}
+    return names
+
+
+@pytest.mark.parametrize("package", FORBIDDEN)
+def test_import_directions(package):
+    files = sorted((ROOT / package).rglob("*.py"))
+    assert files
+    wrong = {str(path.relative_to(ROOT)): imported(path) & FORBIDDEN[package] for path in files}
+    assert not {path: names for path, names in wrong.items() if names}
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import mpm",
+        "import structure",
+        "import coupling",
+        "from typer.testing import CliRunner; import coupling.cli as c; "
+        "import sys; sys.argv = ['gush', '--help']\ntry: c.main()\nexcept SystemExit as e: assert not e.code",
+    ],
+    ids=["mpm", "structure", "coupling", "gush --help"],
+)
+def test_light_imports_load_no_heavy_library(code):
+    check = f"\nimport sys\nprint('HEAVY', *[name for name in {HEAVY!r} if name in sys.modules])"
+    result = subprocess.run([sys.executable, "-c", code + check], capture_output=True, text=True, cwd=ROOT, check=True)
+    assert result.stdout.splitlines()[-1].split() == ["HEAVY"]
+
+
+def test_run_stays_a_function_after_its_module_is_imported():
+    code = "import coupling, coupling.run; from coupling.run import run; assert coupling.run is run and callable(run)"
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)

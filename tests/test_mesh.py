@@ -1,0 +1,270 @@
+"""The mesh fits the ground, the lining and the gate, and no triangle is a sliver."""
+
+import math
+from dataclasses import fields
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import coupling
+from mpm import mesh as meshing
+from mpm.mesh import CHANNEL, HEADROOM, INTERIOR, SOIL, Mesh, MeshError, build_mesh
+from mpm.scene import Scene
+
+# Coordinates up to 60 m in double precision: a few units in the last place.
+ROUND_OFF = 1e-12
+
+
+def changed(scene, **changes) -> Scene:
+    """The scene with other tables."""
+    data = scene.model_dump()
+    for key, value in changes.items():
+        data[key] = {**data[key], **value} if isinstance(value, dict) and isinstance(data[key], dict) else value
+    return Scene(**data)
+
+
+def polygon_area(points) -> float:
+    x, y = points.T
+    return 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
+
+
+def edges_of(mesh) -> set[tuple[int, int]]:
+    pairs = np.concatenate([mesh.elements[:, [i, (i + 1) % 3]] for i in range(3)])
+    return {(min(a, b), max(a, b)) for a, b in pairs.tolist()}
+
+
+def gate_axes(angle):
+    a = math.radians(angle)
+    return np.array([math.sin(a), math.cos(a)]), np.array([math.cos(a), -math.sin(a)])
+
+
+def same(a, b) -> bool:
+    """Equal arrays; tuples of arrays member by member."""
+    if isinstance(a, tuple):
+        return len(a) == len(b) and all(same(x, y) for x, y in zip(a, b, strict=True))
+    return np.array_equal(a, b, equal_nan=True) if np.asarray(a).dtype.kind == "f" else np.array_equal(a, b)
+
+
+def test_triangles_are_counter_clockwise_and_fill_every_region(quick_scene, quick_mesh):
+    scene, mesh = quick_scene.mpm, quick_mesh
+    area = meshing.areas(mesh.nodes, mesh.elements)
+    assert area.min() > 0
+    by_region = {region: area[mesh.region == region].sum() for region in (SOIL, CHANNEL, INTERIOR, HEADROOM)}
+    box = scene.box
+    ring = polygon_area(mesh.nodes[mesh.outer_nodes[0]])
+    assert by_region[SOIL] == pytest.approx(box.width * box.depth - ring, rel=ROUND_OFF)
+    assert by_region[HEADROOM] == pytest.approx(box.width * scene.discretisation.element_size, rel=ROUND_OFF)
+    corners = np.concatenate([[mesh.corner_nodes[0]], mesh.opening_nodes, [mesh.corner_nodes[1]]])
+    inner_corners = [wall[-1] for wall in (mesh.wall_nodes[mesh.wall_side == -1], mesh.wall_nodes[mesh.wall_side == 1])]
+    channel = np.concatenate([corners, [inner_corners[0]], mesh.inner_opening_nodes[::-1], [inner_corners[1]]])
+    assert by_region[CHANNEL] == pytest.approx(polygon_area(mesh.nodes[channel]), rel=1e-10)
+    face = np.concatenate([[inner_corners[1]], mesh.inner_opening_nodes, [inner_corners[0]], mesh.inner_nodes])
+    assert by_region[INTERIOR] == pytest.approx(polygon_area(mesh.nodes[face]), rel=1e-10)
+
+
+def test_lining_nodes_lie_on_the_circles_at_their_angles(quick_scene, quick_mesh):
+    mesh, tunnel = quick_mesh, quick_scene.mpm.tunnels[0]
+    nodes, theta = mesh.outer_nodes[0], np.radians(mesh.outer_theta[0])
+    axis = np.array([tunnel.x, -tunnel.axis_depth])
+    direction = np.column_stack([np.sin(theta), np.cos(theta)])
+    np.testing.assert_allclose(mesh.nodes[nodes] - axis, tunnel.outer_radius * direction, atol=1e-12 * 60)
+    assert np.all(np.diff(mesh.outer_theta[0]) > 0)
+    radius = np.hypot(*(mesh.nodes[mesh.inner_nodes] - axis).T)
+    np.testing.assert_allclose(radius, tunnel.inner_radius, rtol=ROUND_OFF * 30)
+
+
+def test_faces_and_walls_are_mesh_edges(quick_mesh):
+    mesh, edges = quick_mesh, edges_of(quick_mesh)
+    outer = mesh.outer_nodes[0].tolist()
+    chains = [[*outer, outer[0]]]
+    for corner, side in zip(mesh.corner_nodes, mesh.corner_side, strict=True):
+        chains.append([int(corner), *mesh.wall_nodes[mesh.wall_side == side].tolist()])
+    for chain in chains:
+        assert all((min(a, b), max(a, b)) in edges for a, b in pairwise(chain))
+
+
+def test_gate_corners_and_walls_are_a_strip_of_the_gate_width(quick_scene, quick_mesh):
+    scene, mesh = quick_scene.mpm, quick_mesh
+    tunnel, width = scene.tunnels[0], scene.gate.width
+    _, tangent = gate_axes(scene.gate.angle)
+    axis = np.array([tunnel.x, -tunnel.axis_depth])
+    across = (mesh.nodes - axis) @ tangent
+    np.testing.assert_allclose(across[mesh.corner_nodes], [-width / 2, width / 2], atol=1e-13 * 60)
+    np.testing.assert_allclose(across[mesh.wall_nodes], -mesh.wall_side * width / 2, atol=1e-13 * 60)
+    assert np.all(np.diff(across[mesh.opening_nodes]) > 0) or len(mesh.opening_nodes) == 1
+    assert len(mesh.opening_nodes) == scene.discretisation.elements_across_gate - 1
+    assert set(mesh.opening_nodes) | set(mesh.corner_nodes) <= set(mesh.outer_nodes[0])
+
+
+def test_tributary_arcs_are_symmetric_about_the_gate(quick_scene, quick_mesh):
+    offset = (quick_mesh.outer_theta[0] - quick_scene.mpm.gate.angle + 180) % 360 - 180
+    clockwise, counter_clockwise = np.sort(offset[offset > 1e-9]), np.sort(-offset[offset < -1e-9])
+    # The node opposite the gate is at -180 only. The rest: to the error of the integration that places the nodes.
+    np.testing.assert_allclose(counter_clockwise[:-1], clockwise, rtol=1e-5)
+    assert counter_clockwise[-1] == pytest.approx(180)
+
+
+def test_box_sides_hold_the_nodes_of_the_box_sides(quick_scene, quick_mesh):
+    scene, mesh = quick_scene.mpm, quick_mesh
+    x, y = mesh.nodes.T
+    half, top = scene.box.width / 2, scene.discretisation.element_size
+    assert set(mesh.left) == set(np.flatnonzero(x == -half)) and set(mesh.right) == set(np.flatnonzero(x == half))
+    assert set(mesh.bottom) == set(np.flatnonzero(y == -scene.box.depth)) and set(mesh.top) == set(
+        np.flatnonzero(y == top)
+    )
+    assert x.min() == -half and x.max() == half and y.min() == -scene.box.depth and y.max() == top
+
+
+def test_ground_surface_is_a_mesh_line(quick_mesh):
+    height = quick_mesh.nodes[quick_mesh.elements][:, :, 1]
+    assert not np.any((height.min(axis=1) < -1e-9) & (height.max(axis=1) > 1e-9))
+    assert np.all(height[quick_mesh.region == HEADROOM] >= 0)
+
+
+def test_size_at_the_gate_follows_the_elements_across_and_grows_linearly(quick_scene):
+    scene = quick_scene.mpm
+    tunnel, d = scene.tunnels[0], scene.discretisation
+    at_gate = scene.gate.width / d.elements_across_gate
+    size = meshing.element_size(scene, tunnel.x + tunnel.outer_radius + np.array([0.0, 1.0, 40.0]), -tunnel.axis_depth)
+    np.testing.assert_allclose(size, [at_gate, at_gate + d.size_growth, d.element_size])
+
+
+def test_quality_reports_the_smallest_altitude(quick_mesh):
+    altitude = meshing.altitudes(quick_mesh.nodes, quick_mesh.elements)
+    quality = quick_mesh.quality
+    assert quality["min_altitude"] == altitude.min()
+    assert (quality["n_nodes"], quality["n_elements"]) == (len(quick_mesh.nodes), len(quick_mesh.elements))
+    assert quality["min_angle"] > 20 and quality["max_angle"] < 130
+
+
+def test_altitude_of_a_right_triangle():
+    nodes, elements = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 4.0]]), np.array([[0, 1, 2]])
+    assert meshing.altitudes(nodes, elements) == pytest.approx([12 / 5])
+    np.testing.assert_allclose(np.sort(np.degrees(meshing.angles(nodes, elements)[0]))[-1], 90)
+
+
+def test_mesh_twice_is_the_same_bit_for_bit(quick_scene, quick_mesh):
+    again = build_mesh(quick_scene.mpm)
+    assert all(same(getattr(again, f.name), getattr(quick_mesh, f.name)) for f in fields(Mesh))
+
+
+def test_mirrored_mesh_is_the_mesh_seen_from_behind(quick_scene, quick_mesh):
+    mesh, mirror = quick_mesh, quick_mesh.mirrored()
+    np.testing.assert_array_equal(mirror.nodes, mesh.nodes * [-1, 1])
+    np.testing.assert_array_equal(
+        meshing.areas(mirror.nodes, mirror.elements), meshing.areas(mesh.nodes, mesh.elements)
+    )
+    assert mirror.gate_angle == 360 - mesh.gate_angle
+    assert np.all(mirror.nodes[mirror.left, 0] == mirror.nodes[:, 0].min())
+    tunnel = quick_scene.mpm.tunnels[0]
+    theta = np.radians(mirror.outer_theta[0])
+    assert np.all(np.diff(mirror.outer_theta[0]) > 0)
+    np.testing.assert_allclose(
+        mirror.nodes[mirror.outer_nodes[0], 0], tunnel.outer_radius * np.sin(theta), atol=1e-12 * 60
+    )
+    _, tangent = gate_axes(mirror.gate_angle)
+    across = (mirror.nodes - [tunnel.x, -tunnel.axis_depth]) @ tangent
+    assert across[mirror.corner_nodes[0]] < 0 < across[mirror.corner_nodes[1]]
+    assert np.all(np.sign(across[mirror.wall_nodes]) == -mirror.wall_side)
+
+
+def test_mirrored_twice_is_the_mesh(quick_mesh):
+    twice = quick_mesh.mirrored().mirrored()
+    # Angles go through 360 - theta twice: one rounding.
+    np.testing.assert_allclose(twice.outer_theta[0], quick_mesh.outer_theta[0], atol=1e-12 * 360)
+    for f in fields(Mesh):
+        assert f.name == "outer_theta" or same(getattr(twice, f.name), getattr(quick_mesh, f.name)), f.name
+
+
+def test_saved_mesh_loads_as_the_same_mesh(quick_mesh, tmp_path):
+    quick_mesh.save(tmp_path / "mesh.vtu")
+    loaded = Mesh.load(tmp_path / "mesh.vtu")
+    for f in fields(Mesh):
+        assert same(getattr(loaded, f.name), getattr(quick_mesh, f.name)), f.name
+
+
+@pytest.mark.parametrize("content", [None, b"", b"<VTKFile", bytes(range(256))])
+def test_unreadable_mesh_file_is_refused_with_its_name(tmp_path, content):
+    path = tmp_path / "mesh.vtu"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(MeshError, match=r"mesh\.vtu"):
+        Mesh.load(path)
+
+
+def test_truncated_mesh_file_is_refused(quick_mesh, tmp_path):
+    path = tmp_path / "mesh.vtu"
+    quick_mesh.save(path)
+    path.write_bytes(path.read_bytes()[:-2000])
+    with pytest.raises(MeshError, match=r"mesh\.vtu"):
+        Mesh.load(path)
+
+
+def test_sink_ends_at_the_inner_face(quick_scene):
+    mesh = build_mesh(changed(quick_scene.mpm, interior="sink"))
+    assert set(np.unique(mesh.region)) == {SOIL, CHANNEL, HEADROOM} and len(mesh.inner_nodes) == 0
+
+
+def test_without_gate_there_is_neither_channel_nor_interior(quick_scene):
+    mesh = build_mesh(changed(quick_scene.mpm, gate=None, stop={"time": 1.0}))
+    assert set(np.unique(mesh.region)) == {SOIL, HEADROOM}
+    assert len(mesh.corner_nodes) == len(mesh.wall_nodes) == len(mesh.opening_nodes) == 0
+    assert {0.0, 90.0, 180.0, 270.0} <= set(mesh.outer_theta[0])
+
+
+def test_level_ground_without_tunnels_is_a_rectangle(quick_scene):
+    mesh = build_mesh(changed(quick_scene.mpm, gate=None, tunnels=(), stop={"time": 1.0}))
+    area = meshing.areas(mesh.nodes, mesh.elements)
+    assert area[mesh.region == SOIL].sum() == pytest.approx(100.0 * 50.0, rel=ROUND_OFF)
+
+
+def test_soil_layer_boundaries_are_mesh_lines_also_where_they_meet_the_lining(quick_scene):
+    scene = quick_scene.mpm
+    layer = scene.soils[0].model_dump()
+    depths = (7.3, 22.0)
+    mesh = build_mesh(changed(scene, soils=[layer, *({**layer, "top_depth": depth} for depth in depths)]))
+    height = mesh.nodes[mesh.elements[mesh.region == SOIL]][:, :, 1]
+    for depth in depths:
+        across = (height.min(axis=1) < -depth - 1e-9) & (height.max(axis=1) > -depth + 1e-9)
+        assert not across.any()
+
+
+def test_layer_through_the_gate_is_refused(quick_scene):
+    scene = quick_scene.mpm
+    layer = scene.soils[0].model_dump()
+    soils = [layer, {**layer, "top_depth": scene.tunnels[0].axis_depth + 0.02}]
+    with pytest.raises(MeshError, match="gate: must not touch a soil layer boundary"):
+        build_mesh(changed(scene, soils=soils))
+
+
+def test_layer_that_leaves_a_sliver_above_the_crown_is_refused_with_its_place(quick_scene):
+    scene = quick_scene.mpm
+    layer = scene.soils[0].model_dump()
+    with pytest.raises(MeshError, match=r"flattest near x = .* y = -20"):
+        build_mesh(changed(scene, soils=[layer, {**layer, "top_depth": 19.99}]))
+
+
+def test_twin_tunnels_have_a_ring_of_nodes_each():
+    scene = coupling.load_scene(
+        "twin-tunnels", discretisation=coupling.load_scene("quick").mpm.discretisation.model_dump()
+    )
+    mesh = build_mesh(scene.mpm)
+    for tunnel, nodes in zip(scene.mpm.tunnels, mesh.outer_nodes, strict=True):
+        radius = np.hypot(mesh.nodes[nodes, 0] - tunnel.x, mesh.nodes[nodes, 1] + tunnel.axis_depth)
+        np.testing.assert_allclose(radius, tunnel.outer_radius, rtol=1e-13)
+    assert len(mesh.corner_nodes) == 2
+
+
+@settings(max_examples=8, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(angle=st.floats(0, 359.9), width=st.floats(0.1, 0.6), across=st.integers(2, 6))
+def test_any_gate_can_be_meshed(quick_scene, angle, width, across):
+    scene = changed(
+        quick_scene.mpm, gate={"angle": angle, "width": width}, discretisation={"elements_across_gate": across}
+    )
+    mesh = build_mesh(scene)
+    assert len(mesh.opening_nodes) == across - 1
+    across_gate = (mesh.nodes - [0, -scene.tunnels[0].axis_depth]) @ gate_axes(angle)[1]
+    assert np.sign(across_gate[mesh.corner_nodes]).tolist() == [-1, 1]

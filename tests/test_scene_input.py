@@ -1,0 +1,220 @@
+"""Bad input gets one clear message (rule, name, value, remedy); good input is kept exactly."""
+
+import math
+
+import pytest
+from pydantic import ValidationError
+
+import coupling
+from coupling import SceneError
+from mpm.scene import Scene as MpmScene
+
+# Every published case with what sets it apart: gate angle, soil strength and stiffness, cover.
+CASES = {
+    "case-1": (0, 0, 25, 40e6, 20), "case-2": (45, 0, 25, 40e6, 20), "case-3": (90, 0, 25, 40e6, 20),
+    "case-4": (135, 0, 25, 40e6, 20), "case-5": (180, 0, 25, 40e6, 20), "case-6": (90, 5e3, 25, 40e6, 20),
+    "case-7": (90, 0, 35, 40e6, 20), "case-8": (90, 0, 35, 30e6, 20), "case-9": (90, 0, 25, 40e6, 5),
+    "case-10": (90, 0, 25, 40e6, 10),
+}  # fmt: skip
+
+
+def edited(name, table, **values):
+    """`table` of a built-in scene with other values, first entry where it is a list."""
+    data = getattr(coupling.load_scene(name).mpm, table)
+    if isinstance(data, tuple):
+        return {table: [{**data[0].model_dump(), **values}, *(entry.model_dump() for entry in data[1:])]}
+    return {table: values}
+
+
+def test_built_in_scenes_are_quick_the_ten_cases_and_the_twin_tunnels():
+    assert coupling.scene_names() == ["quick", *CASES, "twin-tunnels"]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_cases_are_the_published_ones(name):
+    scene = coupling.load_scene(name)
+    angle, cohesion, friction, modulus, cover = CASES[name]
+    soil, tunnel = scene.mpm.soils[0], scene.mpm.tunnels[0]
+    assert scene.name == name
+    assert (scene.mpm.gate.angle, scene.mpm.gate.width) == (angle, 0.2)
+    assert (soil.cohesion, soil.friction_angle, soil.youngs_modulus) == (cohesion, friction, modulus)
+    assert (soil.porosity, soil.grain_density, soil.poissons_ratio) == (0.45, 2650, 0.3)
+    assert (tunnel.cover, tunnel.outer_diameter, tunnel.inner_diameter, tunnel.x) == (cover, 6.6, 5.9, 0)
+    assert (scene.mpm.box.width, scene.mpm.box.depth) == (100, 50)
+    assert (scene.mpm.water.density, scene.mpm.water.bulk_modulus) == (1000, 80e6)
+    assert scene.mpm.stop.inflow_mass == 2000
+
+
+def test_twin_tunnels_are_the_published_case_study():
+    scene = coupling.load_scene("twin-tunnels").mpm
+    left, right = scene.tunnels
+    assert (right.x - left.x, left.cover, right.cover, scene.box.width) == (pytest.approx(12.8), 23.1, 23.1, 80)
+
+
+@pytest.mark.parametrize("name", ["quick", *CASES, "twin-tunnels"])
+def test_built_in_scenes_have_the_published_ring_and_say_what_they_assume(name):
+    ring = coupling.load_scene(name).ring
+    assert (ring.joint_rotational_stiffness, ring.joint_normal_stiffness, ring.joint_shear_stiffness) == (5e8, 6e8, 8e7)
+    assert ring.joint_angles == (8, 73, 138, 222, 287, 352) and ring.n_elements == 360
+
+
+def test_ground_of_the_ring_is_the_soil_at_the_axis():
+    scene = coupling.load_scene("case-3")
+    buoyant = 0.55 * (2650 - 1000) * 9.81
+    assert scene.ring.ground.vertical_stress == pytest.approx(buoyant * 23.3)
+    assert scene.ring.ground.horizontal_stress == pytest.approx(scene.mpm.soils[0].k0 * buoyant * 23.3)
+
+
+def test_ground_given_in_part_keeps_the_rest_of_the_soil_at_the_axis():
+    ground = coupling.load_scene("quick").ring.ground
+    softer = coupling.load_scene("quick", ring={"ground": {"youngs_modulus": 1e7}}).ring.ground
+    assert softer == ground.model_copy(update={"youngs_modulus": 1e7})
+
+
+def test_source_is_complete_and_loads_as_the_same_scene(tmp_path):
+    for name in ("quick", "twin-tunnels"):
+        scene = coupling.load_scene(name)
+        path = tmp_path / f"{name}.toml"
+        path.write_text(scene.source, encoding="utf-8")
+        assert coupling.load_scene(path) == scene
+
+
+def test_base_may_be_a_file_beside_the_scene(tmp_path, monkeypatch):
+    (tmp_path / "mine.toml").write_text('base = "quick"\n[gate]\nangle = 10.0\n')
+    (tmp_path / "other.toml").write_text('base = "mine.toml"\n[gate]\nwidth = 0.3\n')
+    monkeypatch.chdir("/")
+    gate = coupling.load_scene(tmp_path / "other.toml").mpm.gate
+    assert (gate.angle, gate.width) == (10, 0.3)
+
+
+def test_scene_can_not_be_changed():
+    scene = coupling.load_scene("quick")
+    with pytest.raises(ValidationError):
+        scene.mpm.gate.angle = 10
+    with pytest.raises(ValidationError):
+        scene.mpm = None
+
+
+def test_strings_with_units_are_converted():
+    changes = edited(
+        "quick", "soils", youngs_modulus="40 MPa", hydraulic_conductivity="0.1 mm/s", friction_angle="0.5 rad"
+    )
+    soil = coupling.load_scene("quick", **changes).mpm.soils[0]
+    assert soil.youngs_modulus == pytest.approx(40e6) and soil.hydraulic_conductivity == pytest.approx(1e-4)
+    assert soil.friction_angle == pytest.approx(math.degrees(0.5))
+
+
+@pytest.mark.parametrize(
+    ("table", "values", "parts"),
+    [
+        ("soils", {"porosity": 45}, ["sand", "porosity", "(0", "got 45", "fraction, not percent"]),
+        ("soils", {"hydraulic_conductivity": -1e-4}, ["hydraulic_conductivity", "-0.0001", "m/s"]),
+        ("soils", {"hydraulic_conductivity": 0}, ["hydraulic_conductivity", "got 0"]),
+        ("soils", {"friction_angle": "20 kg"}, ["soils[0].friction_angle", "20 kg", "degree"]),
+        ("soils", {"youngs_modulus": float("nan")}, ["soils[0].youngs_modulus", "nan", "finite"]),
+        ("soils", {"dilatancy_angle": 30}, ["dilatancy_angle", "30", "friction_angle", "25"]),
+        ("soils", {"loose_porosity": 0.4}, ["loose_porosity", "0.4", "porosity"]),
+        ("soils", {"top_depth": 1.0}, ["top_depth", "start at 0", "1"]),
+        ("soils", {"model": "cam-clay"}, ["soils[0].model", "cam-clay", "mohr-coulomb"]),
+        ("soils", {"porosty": 0.4}, ["unknown key", "porosty", "did you mean 'porosity'"]),
+        ("gate", {"width": 3.0}, ["gate", "width", "3", "segment"]),
+        ("gate", {"width": 0.9}, ["gate", "width", "0.9", "segment", "0.82"]),
+        ("gate", {"tunnel": 1}, ["gate", "tunnel", "1", "counted from 0"]),
+        ("gate", {"angle": -10}, ["gate.angle", "-10", "0"]),
+        ("tunnels", {"x": 48.0}, ["tunnel 0", "box", "51.3", "50", "enlarge"]),
+        ("tunnels", {"cover": 45.0}, ["tunnel 0", "box", "51.6", "50", "enlarge"]),
+        ("tunnels", {"inner_diameter": 7.0}, ["inner_diameter", "7", "6.6"]),
+        ("water", {"table_depth": 60.0}, ["table_depth", "60", "50"]),
+        ("discretisation", {"elements_across_gate": 1}, ["elements_across_gate", "got 1", "2"]),
+        ("discretisation", {"element_size": 0.002}, ["discretisation", "memory", "element_size"]),
+        ("discretisation", {"points_per_element": 5}, ["points_per_element", "got 5"]),
+        ("numerics", {"courant": 2}, ["numerics.courant", "got 2", "1"]),
+        ("output", {"interval": 0}, ["output.interval", "got 0"]),
+    ],
+    ids=lambda value: "-".join(value) if isinstance(value, dict) else None,
+)
+def test_bad_value_gets_one_message_with_name_value_and_remedy(table, values, parts):
+    with pytest.raises(SceneError) as caught:
+        coupling.load_scene("quick", **edited("quick", table, **values))
+    message = str(caught.value)
+    assert "has 1 mistake:" in message and len(message.splitlines()) == 2
+    assert not [part for part in parts if part not in message], message
+
+
+def test_overlapping_tunnels_are_refused():
+    tunnel = coupling.load_scene("quick").mpm.tunnels[0].model_dump()
+    with pytest.raises(SceneError, match="tunnels 0 and 1"):
+        coupling.load_scene("quick", tunnels=[tunnel, {**tunnel, "x": 6.0}])
+
+
+@pytest.mark.parametrize(
+    ("changes", "hint"),
+    [
+        ({"disretisation": {}}, "discretisation"),
+        ({"rng": {}}, "ring"),
+        ({"ring": {"join_angles": [8.0]}}, "joint_angles"),
+        ({"ring": {"ground": {"cohesoin": 0.0}}}, "cohesion"),
+        ({"stop": {"inflow_mas": 3.0}}, "inflow_mass"),
+    ],
+)
+def test_unknown_key_gets_a_suggestion(changes, hint):
+    with pytest.raises(SceneError, match=f"unknown key.*did you mean '{hint}'"):
+        coupling.load_scene("quick", **changes)
+
+
+def test_all_mistakes_are_named_at_once():
+    changes = edited("quick", "soils", youngs_modulus=-1) | {
+        "gate": {"angle": 400.0},
+        "ring": {"concrete_modulus": -3.0},
+    }
+    with pytest.raises(SceneError, match="has 3 mistakes") as caught:
+        coupling.load_scene("quick", **changes)
+    assert all(name in str(caught.value) for name in ("soils[0].youngs_modulus", "gate.angle", "ring.concrete_modulus"))
+
+
+def test_missing_physical_number_is_not_filled_in():
+    soil = coupling.load_scene("quick").mpm.soils[0].model_dump()
+    for key in ("hydraulic_conductivity", "k0", "porosity"):
+        with pytest.raises(SceneError, match=rf"soils\[0\].{key}: missing"):
+            coupling.load_scene("quick", soils=[{k: v for k, v in soil.items() if k != key}])
+
+
+def test_scene_made_in_python_meets_the_same_checks():
+    data = coupling.load_scene("quick").mpm.model_dump()
+    data["soils"][0]["porosity"] = 45
+    with pytest.raises(ValidationError, match=r"porosity .*got 45; give a fraction, not percent"):
+        MpmScene(**data)
+
+
+def test_misspelt_scene_name_gets_a_suggestion():
+    with pytest.raises(SceneError, match=r"did you mean 'case-3'.*quick"):
+        coupling.load_scene("cas-3")
+
+
+@pytest.mark.parametrize(
+    ("content", "rule"),
+    [
+        (b'base = "quick"\n[gate]\nangle = ', "valid TOML"),
+        (b'base = "quick"\n[gate', "valid TOML"),
+        (b"\xff\xfe\x00\x01", "UTF-8"),
+        (b"", "empty"),
+        (b"[box]\nwidth = 100.0\n", "missing"),
+        (b"a" * 1_000_001, "1 MB"),
+        (b'base = "mine.toml"', "lead back to itself"),
+        (b'base = "case-33"', "did you mean 'case-3'"),
+        (b"base = 3", "base"),
+        (b'base = "quick"\ngate = 3', "must be a table"),
+        (b'base = "quick"\nring = 3', "must be a table"),
+    ],
+)
+def test_bad_scene_file_is_refused_with_its_name(tmp_path, content, rule):
+    path = tmp_path / "mine.toml"
+    path.write_bytes(content)
+    with pytest.raises(SceneError, match=rule) as caught:
+        coupling.load_scene(path)
+    assert "mine.toml" in str(caught.value) or "case-33" in str(caught.value)
+
+
+def test_folder_is_no_scene_file(tmp_path):
+    with pytest.raises(SceneError, match="readable file"):
+        coupling.load_scene(tmp_path)
