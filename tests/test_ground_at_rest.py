@@ -6,7 +6,7 @@ import pytest
 import coupling
 import mpm
 from mpm.points import initial_stress
-from mpm.variables import SXX, P, VLY, VSX
+from mpm.variables import SXX, VLY, VSX, P
 
 
 @pytest.fixture(scope="module")
@@ -66,5 +66,5 @@ def test_ground_with_a_rough_lining_stays_at_rest():
     assert change < 1e-6 * before[:, P].max()
     assert np.abs(solver.points[:, VSX : VLY + 1]).max() < 1e-9  # m/s: round-off of 5e5 Pa over 500 steps
     lining = solver.lining_pressures(solver.time)[0]
-    soil, water, _, _ = theory(scene, lining["theta"])
+    soil, _water, _, _ = theory(scene, lining["theta"])
     assert np.all(np.isfinite(lining["soil_pressure"])) and soil.min() > 0

@@ -15,9 +15,7 @@ G, K = E / (2 * (1 + NU)), E / (3 * (1 - 2 * NU))
 def return_ordered(trial, c, phi, psi, tension=math.inf):
     phi, psi = math.radians(phi), math.radians(psi)
     apex = c / math.tan(phi) if phi > 0 else math.inf
-    return return_principal(
-        *trial, G, K, c * math.cos(phi), math.sin(phi), math.sin(psi), apex, min(tension, apex)
-    )
+    return return_principal(*trial, G, K, c * math.cos(phi), math.sin(phi), math.sin(psi), apex, min(tension, apex))
 
 
 def yield_value(s, c, phi):

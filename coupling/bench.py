@@ -1,0 +1,161 @@
+"""Cost of a point-step: the full two-phase solver beside a plain single-phase loop in the same process.
+
+The reference is what a textbook MLS-MPM code does per point and step: quadratic B-splines on a square grid, APIC
+transfer, a weakly compressible fluid; one phase, one stress number, no contact. Source: Hu et al. (2018), the 88-line
+program that comes with it.
+"""
+
+import math
+import time as clock
+
+import numba
+import numpy as np
+
+ROUNDS = 3
+SECONDS_A_ROUND = 3.0
+WARM_UP_STEPS = 120  # more than the solver goes between sorting its points
+
+
+def bench(scene, rounds=ROUNDS, seconds=SECONDS_A_ROUND):
+    """Measure processor time of stepping, one thread, in turns with the reference loop.
+
+    Parameters
+    ----------
+    scene : coupling.Scene
+        Gate open, from the geostatic state.
+    rounds : int
+        The best of them counts: other programs only ever slow one down.
+    seconds : float
+        Processor time of each part of a round [s].
+
+    Returns
+    -------
+    dict
+        step_points_per_second, reference_points_per_second: point-steps per second of processor time;
+        step_to_reference_ratio; scene, points, elements, rounds; step_rounds, reference_rounds: all measurements.
+    """
+    import mpm
+
+    mesh = mpm.build_mesh(scene.mpm)
+    solver = mpm.Solver(scene.mpm, mesh, threads=1)
+    solver.open_gate()
+    reference = ReferenceLoop(solver.n_points)
+    for _ in range(WARM_UP_STEPS):
+        solver.step()
+        reference.step()
+    step_rounds, reference_rounds = [], []
+    for _ in range(rounds):
+        before = solver.point_steps
+        _, used = _timed(solver.step, seconds)
+        step_rounds.append((solver.point_steps - before) / used)
+        count, used = _timed(reference.step, seconds)
+        reference_rounds.append(count * solver.n_points / used)
+    return {
+        "step_points_per_second": max(step_rounds),
+        "reference_points_per_second": max(reference_rounds),
+        "step_to_reference_ratio": max(step_rounds) / max(reference_rounds),
+        "scene": scene.name,
+        "points": int(solver.n_points),
+        "elements": len(mesh.elements),
+        "rounds": rounds,
+        "step_rounds": step_rounds,
+        "reference_rounds": reference_rounds,
+    }
+
+
+def _timed(step, seconds):
+    """Repeat `step` for some processor time; returns (count, processor seconds)."""
+    count, begin = 0, clock.process_time()
+    while clock.process_time() - begin < seconds:
+        step()
+        count += 1
+    return count, clock.process_time() - begin
+
+
+class ReferenceLoop:
+    """A block of fluid falling in a box, four points a cell.
+
+    Parameters
+    ----------
+    n_points : int
+    """
+
+    def __init__(self, n_points):
+        # the block fills a quarter of the box
+        self.cells = max(16, 2 * math.ceil(math.sqrt(n_points / 4)))
+        rng = np.random.default_rng(1)
+        self.position = 0.25 + 0.5 * rng.random((n_points, 2))
+        # sorted by cell, as the points of the solver are by element
+        column, row = (self.position * self.cells).astype(int).T
+        self.position = np.ascontiguousarray(self.position[np.lexsort((row, column))])
+        self.velocity = np.zeros((n_points, 2))
+        self.affine = np.zeros((n_points, 2, 2))
+        self.volume_ratio = np.ones(n_points)
+        self.grid = np.zeros((self.cells, self.cells, 3))
+
+    def step(self):
+        """Advance by one step."""
+        dt = 0.02 / self.cells
+        reference_step(self.position, self.velocity, self.affine, self.volume_ratio, self.grid, self.cells, dt)
+
+
+@numba.njit(fastmath=True)
+def reference_step(position, velocity, affine, volume_ratio, grid, cells, dt):
+    """One step of weakly compressible MLS-MPM in the unit square, in place.
+
+    position, velocity : (n, 2) float64;  affine : (n, 2, 2) float64;  volume_ratio : (n,) float64
+    grid : (cells, cells, 3) float64, momentum and mass;  dt in units where gravity is 9.8 and the wave speed 20.
+    """
+    spacing, inverse = 1.0 / cells, float(cells)
+    volume = (0.5 * spacing) ** 2
+    stiffness = 400.0
+    weight_x, weight_y = np.empty(3), np.empty(3)
+    grid[:] = 0.0
+    for i in range(len(position)):
+        x, y = position[i, 0] * inverse, position[i, 1] * inverse
+        column, row = int(x - 0.5), int(y - 0.5)
+        fx, fy = x - column, y - row
+        weight_x[0], weight_x[1], weight_x[2] = 0.5 * (1.5 - fx) ** 2, 0.75 - (fx - 1) ** 2, 0.5 * (fx - 0.5) ** 2
+        weight_y[0], weight_y[1], weight_y[2] = 0.5 * (1.5 - fy) ** 2, 0.75 - (fy - 1) ** 2, 0.5 * (fy - 0.5) ** 2
+        stress = -dt * 4 * stiffness * volume * (volume_ratio[i] - 1) * inverse * inverse
+        a00, a01 = stress + volume * affine[i, 0, 0], volume * affine[i, 0, 1]
+        a10, a11 = volume * affine[i, 1, 0], stress + volume * affine[i, 1, 1]
+        for a in range(3):
+            for b in range(3):
+                dx, dy = (a - fx) * spacing, (b - fy) * spacing
+                weight = weight_x[a] * weight_y[b]
+                grid[column + a, row + b, 0] += weight * (volume * velocity[i, 0] + a00 * dx + a01 * dy)
+                grid[column + a, row + b, 1] += weight * (volume * velocity[i, 1] + a10 * dx + a11 * dy)
+                grid[column + a, row + b, 2] += weight * volume
+    for a in range(cells):
+        for b in range(cells):
+            if grid[a, b, 2] > 0:
+                vx, vy = grid[a, b, 0] / grid[a, b, 2], grid[a, b, 1] / grid[a, b, 2] - dt * 9.8
+                if (a < 3 and vx < 0) or (a > cells - 4 and vx > 0):
+                    vx = 0.0
+                if (b < 3 and vy < 0) or (b > cells - 4 and vy > 0):
+                    vy = 0.0
+                grid[a, b, 0], grid[a, b, 1] = vx, vy
+    for i in range(len(position)):
+        x, y = position[i, 0] * inverse, position[i, 1] * inverse
+        column, row = int(x - 0.5), int(y - 0.5)
+        fx, fy = x - column, y - row
+        weight_x[0], weight_x[1], weight_x[2] = 0.5 * (1.5 - fx) ** 2, 0.75 - (fx - 1) ** 2, 0.5 * (fx - 0.5) ** 2
+        weight_y[0], weight_y[1], weight_y[2] = 0.5 * (1.5 - fy) ** 2, 0.75 - (fy - 1) ** 2, 0.5 * (fy - 0.5) ** 2
+        vx = vy = c00 = c01 = c10 = c11 = 0.0
+        for a in range(3):
+            for b in range(3):
+                dx, dy = a - fx, b - fy
+                weight = weight_x[a] * weight_y[b]
+                gx, gy = grid[column + a, row + b, 0], grid[column + a, row + b, 1]
+                vx += weight * gx
+                vy += weight * gy
+                c00 += 4 * inverse * weight * gx * dx
+                c01 += 4 * inverse * weight * gx * dy
+                c10 += 4 * inverse * weight * gy * dx
+                c11 += 4 * inverse * weight * gy * dy
+        velocity[i, 0], velocity[i, 1] = vx, vy
+        affine[i, 0, 0], affine[i, 0, 1], affine[i, 1, 0], affine[i, 1, 1] = c00, c01, c10, c11
+        position[i, 0] = min(max(position[i, 0] + dt * vx, 2 * spacing), 1 - 2 * spacing)
+        position[i, 1] = min(max(position[i, 1] + dt * vy, 2 * spacing), 1 - 2 * spacing)
+        volume_ratio[i] *= 1 + dt * (c00 + c11)

@@ -1,0 +1,385 @@
+"""The command line `gush`: run, plan, respond, scenes, bench.
+
+Exit codes: 0 done, 2 refused input, 3 run failed, 130 interrupted. Heavy libraries load inside the commands.
+"""
+
+import contextlib
+import json
+import sys
+import time as clock
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+REFUSED, FAILED, INTERRUPTED = 2, 3, 130
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    help="Water and soil gushing into a shield tunnel: two-phase MPM, lining pressures, forces in the ring.",
+    epilog="Exit codes: 0 done, 2 refused input, 3 run failed, 130 interrupted.",
+)
+
+SceneName = Annotated[str, typer.Argument(help="A built-in scene (see `gush scenes`) or a TOML file.")]
+JsonPath = Annotated[Path | None, typer.Option("--json", help="Also write the result as JSON; - prints it.")]
+Threads = Annotated[int | None, typer.Option(min=1, help="Threads; all cores when left out. Does not change results.")]
+
+
+@app.command("run")
+def run_command(
+    scene: SceneName = "quick",
+    out: Annotated[Path | None, typer.Option(help="Folder of the run; runs/SCENE, numbered, when left out.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")] = False,
+    threads: Threads = None,
+    no_figures: Annotated[bool, typer.Option("--no-figures", help="No ring response, no pictures.")] = False,
+    json_path: JsonPath = None,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Print errors only.")] = False,
+):
+    """Open the gate of a scene and compute inflow, lining pressures and ring forces.
+
+    JSON: keys of `coupling.summary.summarise_run`, and `run` (folder), `figures` (paths), `response` (keys of
+    `coupling.summary.summarise_response`, or null).
+    """
+    with _failures(), _checked_json(json_path):
+        from coupling.datasets import RunFileError, read_response
+        from coupling.run import run
+        from coupling.run_folder import FIGURES
+        from coupling.scene import load_scene
+        from coupling.summary import summarise_response, summarise_run
+
+        loaded = load_scene(scene)
+        with ProgressLine(loaded.mpm.stop, quiet) as line:
+            folder = Path(run(loaded, out, overwrite, line, threads, figures=not no_figures).attrs["run"])
+        data = {"run": str(folder), **summarise_run(folder), "response": None}
+        with contextlib.suppress(RunFileError):
+            data["response"] = summarise_response(read_response(folder))
+        data["figures"] = sorted(str(path) for path in (folder / FIGURES).glob("*.png"))
+        _write_json(json_path, data)
+        if not quiet and str(json_path) != "-":
+            console = Console()
+            console.print(_run_table(data))
+            if data["response"]:
+                console.print(_response_table(data["response"]))
+            console.print(f"results in {folder}", highlight=False, soft_wrap=True)
+
+
+@app.command("plan")
+def plan_command(scene: SceneName, threads: Threads = None, json_path: JsonPath = None):
+    """What a run would do and cost: active parts, points, time step, steps, memory, time.
+
+    JSON: keys of `coupling.plan.plan`.
+    """
+    with _failures(), _checked_json(json_path):
+        from coupling.plan import plan
+        from coupling.scene import load_scene
+
+        data = plan(load_scene(scene), threads)
+        _write_json(json_path, data)
+        if str(json_path) != "-":
+            console = Console()
+            console.print(_feature_table(data))
+            console.print(_cost_table(data))
+
+
+@app.command("respond")
+def respond_command(
+    run: Annotated[Path, typer.Argument(help="Folder (or run.nc) of a run.")],
+    json_path: JsonPath = None,
+):
+    """Compute the ring's response (beam-spring) to the pressures of a run, and store it with the run.
+
+    JSON: keys of `coupling.summary.summarise_response`, and `run`.
+    """
+    with _failures(), _checked_json(json_path):
+        import tomllib
+
+        from coupling.datasets import read_attributes, read_pressures, run_file, write_response
+        from coupling.run import respond
+        from coupling.scene import make_scene
+        from coupling.summary import summarise_response
+
+        file = run_file(run)
+        scene = make_scene(tomllib.loads(read_attributes(file)["scene"]), str(file))
+        response = respond(scene, read_pressures(file))
+        write_response(file, response)
+        data = {"run": str(run), **summarise_response(response)}
+        _write_json(json_path, data)
+        if str(json_path) != "-":
+            Console().print(_response_table(data))
+
+
+@app.command("scenes")
+def scenes_command(json_path: JsonPath = None):
+    """List the built-in scenes.
+
+    JSON: `scenes`, a list of {name, soil, cover [m], gate_angle [degree], gate_width [m], tunnels, stop_time [s],
+    stop_inflow_mass [kg/m]}.
+    """
+    with _failures(), _checked_json(json_path):
+        from coupling.scene import load_scene, scene_names
+
+        data = {"scenes": [_scene_row(load_scene(name).mpm) for name in scene_names()]}
+        _write_json(json_path, data)
+        if str(json_path) != "-":
+            table = Table("scene", "soil", "cover", "gate", "tunnels", "until")
+            for row in data["scenes"]:
+                until = [f"{row['stop_inflow_mass']:g} kg/m"] if row["stop_inflow_mass"] else []
+                until += [f"{row['stop_time']:g} s"] if row["stop_time"] else []
+                table.add_row(
+                    row["name"],
+                    row["soil"],
+                    f"{row['cover']:g} m",
+                    "none" if row["gate_angle"] is None else f"{row['gate_angle']:g}°, {row['gate_width']:g} m",
+                    str(row["tunnels"]),
+                    ", ".join(until),
+                )
+            Console().print(table)
+
+
+@app.command("bench")
+def bench_command(
+    json_path: JsonPath = None,
+    scene: Annotated[str, typer.Option(help="Scene whose step is measured.")] = "case-3",
+):
+    """Point-steps per CPU second of one core, beside a plain reference loop in the same process.
+
+    JSON: step_points_per_second, reference_points_per_second, step_to_reference_ratio and the keys of
+    `coupling.bench.bench`.
+    """
+    with _failures(), _checked_json(json_path):
+        from coupling.bench import bench
+        from coupling.scene import load_scene
+
+        data = bench(load_scene(scene))
+        _write_json(json_path, data)
+        if str(json_path) != "-":
+            table = Table("point-steps per CPU second", "million", title=f"{data['scene']}, {data['points']} points")
+            table.add_row("two-phase step of this program", f"{data['step_points_per_second'] / 1e6:.2f}")
+            table.add_row("plain one-phase reference loop", f"{data['reference_points_per_second'] / 1e6:.2f}")
+            table.add_row("ratio", f"{data['step_to_reference_ratio']:.2f}")
+            Console().print(table)
+
+
+def main():
+    """Entry point of the command `gush`."""
+    app()
+
+
+class ProgressLine:
+    """The live line of a run, on a terminal only; callable with the solver's progress dicts.
+
+    Parameters
+    ----------
+    stop : mpm.scene.Stop
+        What the time left is estimated from.
+    quiet : bool
+    """
+
+    def __init__(self, stop, quiet=False):
+        self._stop, self._begin = stop, None
+        self._console = Console(stderr=True)
+        self._status = None
+        if self._console.is_terminal and not quiet:
+            self._status = self._console.status("starting")
+
+    def __enter__(self):
+        if self._status is not None:
+            self._status.start()
+        return self
+
+    def __exit__(self, *_):
+        if self._status is not None:
+            self._status.stop()
+
+    def __call__(self, state):
+        """Show one progress dict of `mpm.simulate`."""
+        if self._status is not None:
+            self._status.update(self.text(state), spinner_style="blue")
+
+    def text(self, state):
+        """The line for one progress dict."""
+        stage = state["stage"]
+        if stage == "relax":
+            return f"initial equilibrium: step {state['step']}, residual {state['residual']:.1e}"
+        if stage != "gush":
+            return {"mesh": "meshing", "respond": "ring response", "figures": "pictures"}.get(stage, stage)
+        if self._begin is None:
+            self._begin = clock.monotonic()
+        return (
+            f"t {state['time']:.3f} s  inflow {state['inflow_mass']:.0f} kg/m  "
+            f"dt {1e6 * state['dt']:.0f} µs ({state['dt_limit']})  "
+            f"{state['point_steps_per_second'] / 1e6:.1f} M point-steps/s  {self._left(state)} left"
+        )
+
+    def _left(self, state):
+        shares = [
+            done / target
+            for done, target in ((state["time"], self._stop.time), (state["inflow_mass"], self._stop.inflow_mass))
+            if target is not None
+        ]
+        share, elapsed = max(shares), clock.monotonic() - self._begin
+        if share < 0.01 or elapsed < 1.0:
+            return "?"
+        return _duration(elapsed * (1 - min(share, 1.0)) / share)
+
+
+@contextlib.contextmanager
+def _failures():
+    """Turn what a user can cause into one message and an exit code."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        _complain("interrupted; what was computed stays readable", INTERRUPTED)
+    except (ValueError, RuntimeError, MemoryError, OSError) as error:
+        code = _exit_code(error)
+        if code is None:
+            raise
+        _complain("\n".join([str(error) or "not enough memory", *getattr(error, "__notes__", ())]), code)
+
+
+def _exit_code(error):
+    """2 for refused input, 3 for a failed run, None for what is a mistake of the program."""
+    from coupling.datasets import RunFileError
+    from coupling.run_folder import RunRefused
+    from coupling.scene import SceneError
+    from mpm.mesh import MeshError
+    from mpm.solver import RunFailed
+    from structure import LiningFailure
+
+    if isinstance(error, (RunFileError, RunRefused, SceneError, MeshError, MemoryError, JsonRefused)):
+        return REFUSED
+    if isinstance(error, (RunFailed, LiningFailure)):
+        return FAILED
+    # what reaches here as OSError is a full disk or a missing right, found while writing
+    return FAILED if isinstance(error, OSError) else None
+
+
+class JsonRefused(ValueError):
+    """A --json path that cannot be written."""
+
+
+@contextlib.contextmanager
+def _checked_json(path):
+    """Refuse a --json path before the work instead of after it."""
+    if path is not None and str(path) != "-":
+        if path.is_dir() or not path.absolute().parent.is_dir():
+            raise JsonRefused(f"--json '{path}': must be a file in an existing folder; choose another path")
+        if path.exists():
+            with path.open("rb") as file:
+                if file.read(1) not in (b"{", b""):
+                    raise JsonRefused(f"--json '{path}': exists and is not JSON; choose another path")
+    yield
+
+
+def _write_json(path, data):
+    if path is None:
+        return
+    text = json.dumps(data, indent=2) + "\n"
+    if str(path) == "-":
+        sys.stdout.write(text)
+    else:
+        path.write_text(text, encoding="utf-8")
+
+
+def _complain(message, code):
+    Console(stderr=True).print(message, style="red", markup=False, highlight=False, soft_wrap=True)
+    raise typer.Exit(code)
+
+
+def _scene_row(scene):
+    gate = scene.gate
+    return {
+        "name": scene.name,
+        "soil": ", ".join(soil.name for soil in scene.soils),
+        "cover": scene.tunnels[0].cover if scene.tunnels else None,
+        "gate_angle": None if gate is None else gate.angle,
+        "gate_width": None if gate is None else gate.width,
+        "tunnels": len(scene.tunnels),
+        "stop_time": scene.stop.time,
+        "stop_inflow_mass": scene.stop.inflow_mass,
+    }
+
+
+def _run_table(data):
+    table = Table("quantity", "value", title=f"{data['scene']}: {data['status']}")
+    rows = [
+        ("simulated time", f"{data['time']:.3f} s"),
+        ("inflow mass", f"{data['inflow_mass']:.0f} kg/m"),
+        ("flow zone, disturbed zone", f"{data['flow_zone_area']:.1f}, {data['disturbed_area']:.1f} m²"),
+    ]
+    for name, label in (("soil_pressure", "soil pressure"), ("water_pressure", "water pressure")):
+        for place, values in data.get(name, {}).items():
+            rows.append((f"{label}, {place}", f"{values['initial'] / 1e3:.0f} -> {values['final'] / 1e3:.0f} kPa"))
+    rows += [
+        ("steps, mean dt", f"{data['steps']}, {1e6 * data['mean_dt']:.0f} µs ({data['dt_limit']})"),
+        ("grain mass error", f"{data['grain_mass_error']:.1e}"),
+        ("point-steps per CPU second", f"{data['point_steps_per_cpu_second'] / 1e6:.1f} million"),
+        ("wall, CPU time", f"{data['wall_seconds']:.0f} s, {data['cpu_seconds']:.0f} s"),
+    ]
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
+def _response_table(data):
+    table = Table("ring", "initial", "final")
+    for name, label, unit in (
+        ("axial_force", "N", "kN/m"),
+        ("shear_force", "Q", "kN/m"),
+        ("bending_moment", "M", "kN m/m"),
+    ):
+        for extreme in ("max", "min"):
+            table.add_row(
+                f"{label} {extreme} [{unit}]".replace("[", "\\["),
+                *(
+                    f"{data[name][state][extreme] / 1e3:.0f} at {data[name][state][extreme + '_theta'] % 360:.4g} deg"
+                    for state in ("initial", "final")
+                ),
+            )
+    for name, label in (("joint_opening", "joint opening [mm]"), ("joint_rotation", "joint rotation [mrad]")):
+        if data[name]["final"]:
+            cells = (" ".join(f"{1e3 * value:.2f}" for value in data[name][state]) for state in ("initial", "final"))
+            table.add_row(label.replace("[", "\\["), *cells)
+    return table
+
+
+def _feature_table(data):
+    table = Table("part", "", "why", title=f"{data['scene']}: what is computed")
+    for row in data["features"]:
+        table.add_row(row["feature"], "active" if row["active"] else "left out", row["reason"])
+    return table
+
+
+def _cost_table(data):
+    most = "no stop time given" if data["steps_at_most"] is None else f"at most {data['steps_at_most']}"
+    table = Table("cost", "", title=f"{data['scene']}: what it costs")
+    free = data["free_memory_bytes"]
+    for row in (
+        ("elements, nodes, points", f"{data['elements']}, {data['nodes']}, {data['points']}"),
+        ("flattest triangle, smallest angle", f"{data['min_altitude']:.3f} m, {data['min_angle']:.0f} deg"),
+        ("time step", f"{1e6 * data['dt']:.0f} µs ({data['dt_limit']})"),
+        ("simulated time", f"about {data['expected_time']:.2g} s (a guess where an inflow mass ends the run)"),
+        ("steps", f"about {data['expected_steps']}, {most}"),
+        ("records", f"about {data['records']}"),
+        ("memory", f"{data['memory_bytes'] / 1e6:.0f} MB" + (f" of {free / 1e9:.1f} GB free" if free else "")),
+        ("speed measured now", f"{data['point_steps_per_second'] / 1e6:.1f} M point-steps/s"),
+        ("time of stepping", f"about {_duration(data['expected_seconds'])}"),
+    ):
+        table.add_row(*row)
+    return table
+
+
+def _duration(seconds):
+    """Seconds as people say them."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,449 @@
+"""The run file: its schema, the writer that appends while a run goes on, and readers with clear errors.
+
+One netCDF-4 file a run, SI units, angles in degrees from the crown, clockwise. Groups: `/lining` (pressures on a
+uniform theta grid), `/history` (inflow, zones, balances, time step), `/points` (snapshots), `/mesh`, and
+`/structure/<model>` (responses). The root carries attributes only: provenance and `status`.
+"""
+
+import math
+import os
+import time as clock
+from pathlib import Path
+
+import numpy as np
+
+from mpm.variables import CLAMPS, POINT_VARIABLES
+
+STATUSES = ("running", "finished", "failed", "interrupted")
+DT_LIMITS = ("acoustic", "advective", "output", "other")
+SECONDS_BETWEEN_WRITES = 1.0
+
+#: Variables on (time, [tunnel,] theta): name to (units, long_name). Interval means, resampled conservatively.
+PRESSURES = {
+    "soil_pressure": ("Pa", "effective soil pressure on the lining, compression positive"),
+    "water_pressure": ("Pa", "water pressure on the lining, compression positive"),
+    "soil_shear": ("Pa", "shear traction of the soil on the lining, clockwise positive"),
+    "soil_pressure_std": ("Pa", "standard deviation of the soil pressure within the output interval"),
+    "water_pressure_std": ("Pa", "standard deviation of the water pressure within the output interval"),
+}
+#: Variables on (time,) that `/lining` repeats from `/history`, so that pressures can be compared at equal inflow.
+PROGRESS = {
+    "inflow_mass": ("kg m-1", "grains inside the tunnel, per metre of tunnel"),
+    "flow_zone_area": ("m2", "area of soil displaced by more than 50 mm"),
+    "disturbed_area": ("m2", "area of soil displaced by 10 to 50 mm"),
+}
+#: Variables on (time,) of `/history`.
+HISTORY = {
+    **PROGRESS,
+    "grain_mass": ("kg m-1", "mass of all grains, those taken out included; constant"),
+    "suspended_fraction": ("1", "share of points whose grains do not touch"),
+    "kinetic_energy": ("J m-1", "kinetic energy of the grains"),
+    "max_velocity": ("m s-1", "largest velocity of the grains"),
+    "dt": ("s", "mean time step in the interval"),
+    "steps": ("1", "time steps since the gate opened"),
+    "point_steps": ("1", "updates of one point by one step since the gate opened"),
+    "cpu_seconds": ("s", "processor time since the simulation started"),
+    "dt_limit": ("1", "what limited the time step most often in the interval"),
+    **{f"clamp_{name}": ("1", f"updates at which the limit '{name}' acted, since the start") for name in CLAMPS},
+}
+INTEGERS = {"steps", "point_steps", *(f"clamp_{name}" for name in CLAMPS)}
+#: Variables on (time, point) of `/points`, from the solver's own table.
+POINTS = {
+    **{name: (unit, meaning) for name, unit, meaning in POINT_VARIABLES if not name.endswith("_initial")},
+    "displacement_x": ("m", "horizontal displacement since the start"),
+    "displacement_y": ("m", "vertical displacement since the start, upward positive"),
+    "volume": ("m2", "area that the point stands for, per metre of tunnel"),
+    "soil": ("1", "number of the soil layer, from 0"),
+}
+
+
+class RunFileError(ValueError):
+    """A run file that cannot be used: which one, why, and what to do."""
+
+
+# -- the theta grid -------------------------------------------------------------------------------
+
+
+def cell_centres():
+    """Centres of the 360 one-degree cells: 0, 1, .. 359 [degree]."""
+    return np.arange(360.0)
+
+
+def cell_bounds():
+    """Lower and upper bound of every cell, (360, 2) float64 [degree]; the first is -0.5 .. 0.5."""
+    return cell_centres()[:, None] + np.array([-0.5, 0.5])
+
+
+def cell_mean_weights(theta):
+    """Weights that turn nodal values into cell means of their piecewise linear periodic interpolation.
+
+    The interpolation is integrated exactly over every cell, so the integral around the ring is kept.
+
+    Parameters
+    ----------
+    theta : (n,) float64
+        Angles of the nodes [degree], ascending in [0, 360), at least two.
+
+    Returns
+    -------
+    (360, n) float64
+        Rows sum to 1.
+    """
+    theta = np.asarray(theta, float)
+    n = len(theta)
+    if n < 2 or theta[0] < 0 or theta[-1] >= 360 or np.any(np.diff(theta) <= 0):
+        raise ValueError(f"theta: at least two ascending angles in [0, 360) degrees, got {n} between {theta.min():g} "
+                         f"and {theta.max():g}; sort them and drop repeated ones")  # fmt: skip
+    edges = cell_bounds()[:, 0]
+    breaks = np.unique(np.concatenate([edges, edges[:1] + 360.0, theta, theta - 360.0]))
+    breaks = breaks[(breaks >= edges[0]) & (breaks <= edges[0] + 360.0)]
+    middle, length = 0.5 * (breaks[1:] + breaks[:-1]), np.diff(breaks)
+    cell = np.floor(middle + 0.5).astype(int)
+    # on a piece without a break inside, the mean of a linear function is its value in the middle
+    wrapped = np.concatenate([theta[-1:] - 360.0, theta, theta[:1] + 360.0])
+    left = np.searchsorted(wrapped, middle) - 1
+    share = (middle - wrapped[left]) / (wrapped[left + 1] - wrapped[left])
+    weights = np.zeros((360, n))
+    np.add.at(weights, (cell, (left - 1) % n), length * (1 - share))
+    np.add.at(weights, (cell, left % n), length * share)
+    return weights
+
+
+# -- writing --------------------------------------------------------------------------------------
+
+
+class RunWriter:
+    """Appends records to a run file that any reader can open at any moment, also after a kill.
+
+    Each batch opens the file, grows the dimensions, writes the data, the times last, and closes it.
+
+    Parameters
+    ----------
+    path : str or path
+        Written anew.
+    attributes : dict
+        Root attributes, from :func:`coupling.provenance.root_attributes`.
+    scene : mpm.scene.Scene
+        For the geometry that figures need.
+    mesh : mpm.mesh.Mesh or None
+        Stored in `/mesh` when given.
+    """
+
+    def __init__(self, path, attributes, scene, mesh=None):
+        self.path = Path(path)
+        self._waiting, self._last_write = [], -math.inf
+        self._weights = {}
+        self._count = self._snapshots = 0
+        self._n_tunnels = len(scene.tunnels)
+        self._create(attributes, geometry_attributes(scene), mesh)
+
+    def append(self, record):
+        """Take one `mpm.Record`; it reaches the file at once or with the next batch, within about a second."""
+        self._waiting.append(record)
+        if clock.monotonic() - self._last_write >= SECONDS_BETWEEN_WRITES:
+            self.flush()
+
+    def flush(self):
+        """Write what waits."""
+        if not self._waiting:
+            return
+        batch = list(self._waiting)
+        snapshots = [record for record in batch if record.points is not None]
+        with _append_to(self.path) as file:
+            if snapshots:
+                self._write_points(file["points"], snapshots)
+            self._write_lining(file["lining"], batch)
+            self._write_history(file["history"], batch)
+        # only now: a write that Ctrl-C cut short is repeated in the same rows
+        del self._waiting[: len(batch)]
+        self._count += len(batch)
+        self._snapshots += len(snapshots)
+        self._last_write = clock.monotonic()
+
+    def close(self, status, message="", **attributes):
+        """Write what waits and how the run ended: 'finished', 'failed' or 'interrupted'."""
+        self.flush()
+        write_attributes(self.path, status=status, status_message=message, **attributes)
+
+    def _create(self, attributes, geometry, mesh):
+        import h5netcdf
+
+        with h5netcdf.File(self.path, "w") as file:
+            for name, value in {**attributes, "status": "running", "status_message": ""}.items():
+                file.attrs[name] = value
+            space = ("tunnel", "theta") if self._n_tunnels > 1 else ("theta",)
+            lining = self._create_group(file, "lining", geometry)
+            if self._n_tunnels > 0:
+                lining.dimensions.update({"theta": 360, "bound": 2})
+                if self._n_tunnels > 1:
+                    lining.dimensions["tunnel"] = self._n_tunnels
+                    _variable(lining, "tunnel", ("tunnel",), "i4", ("1", "tunnel, counted from 0"))[:] = np.arange(
+                        self._n_tunnels
+                    )
+                theta = _variable(lining, "theta", ("theta",), "f8", ("degree", "angle from the crown, clockwise"))
+                theta[:] = cell_centres()
+                theta.attrs["bounds"] = "theta_bnds"
+                lining.create_variable("theta_bnds", ("theta", "bound"), "f8")[:] = cell_bounds()
+                shape = (16, *([self._n_tunnels] if self._n_tunnels > 1 else []), 360)
+                for name, meaning in PRESSURES.items():
+                    variable = _variable(lining, name, ("time", *space), "f8", meaning, shape)
+                    variable.attrs["cell_methods"] = "time: mean theta: mean"
+            for name, meaning in PROGRESS.items():
+                _variable(lining, name, ("time",), "f8", meaning, (256,))
+            history = self._create_group(file, "history", {})
+            for name, meaning in HISTORY.items():
+                kind = "i8" if name in INTEGERS else "i1" if name == "dt_limit" else "f8"
+                _variable(history, name, ("time",), kind, meaning, (256,))
+            history["dt_limit"].attrs["flag_values"] = np.arange(len(DT_LIMITS), dtype="i1")
+            history["dt_limit"].attrs["flag_meanings"] = " ".join(DT_LIMITS)
+            points = self._create_group(file, "points", geometry)
+            points.attrs["comment"] = "values of one time are in no particular order; padded with NaN"
+            if mesh is not None:
+                _write_mesh(file.create_group("mesh"), mesh, geometry)
+
+    @staticmethod
+    def _create_group(file, name, attributes):
+        group = file.create_group(name)
+        for key, value in attributes.items():
+            group.attrs[key] = value
+        group.dimensions["time"] = None
+        _variable(group, "time", ("time",), "f8", ("s", "time since the gate opened"), (256,), fill=np.nan)
+        return group
+
+    def _write_lining(self, group, batch):
+        rows = slice(self._count, self._count + len(batch))
+        group.resize_dimension("time", rows.stop)
+        for name in PRESSURES if self._n_tunnels else ():
+            values = np.array([[self._resample(t, part, name) for t, part in enumerate(r.lining)] for r in batch])
+            group[name][rows] = values if self._n_tunnels > 1 else values[:, 0]
+        for name in PROGRESS:
+            group[name][rows] = [getattr(record, name) for record in batch]
+        group["time"][rows] = [record.time for record in batch]
+
+    def _resample(self, tunnel, part, name):
+        if tunnel not in self._weights:
+            self._weights[tunnel] = cell_mean_weights(part["theta"])
+        return self._weights[tunnel] @ part[name]
+
+    def _write_history(self, group, batch):
+        rows = slice(self._count, self._count + len(batch))
+        group.resize_dimension("time", rows.stop)
+        for name in HISTORY:
+            if name.startswith("clamp_"):
+                values = [record.clamp_counts.get(name.removeprefix("clamp_"), 0) for record in batch]
+            elif name == "dt_limit":
+                values = [_limit_flag(record.dt_limit) for record in batch]
+            else:
+                values = [getattr(record, name) for record in batch]
+            group[name][rows] = np.array(values)
+        group["time"][rows] = [record.time for record in batch]
+
+    def _write_points(self, group, snapshots):
+        most = max(len(record.points["x"]) for record in snapshots)
+        if "point" not in group.dimensions:
+            group.dimensions["point"] = None
+            for name, meaning in POINTS.items():
+                if name in snapshots[0].points:
+                    _variable(group, name, ("time", "point"), "f4", meaning, (1, most), fill=np.nan, compress=True)
+        group.resize_dimension("point", max(most, group.dimensions["point"].size))
+        rows = slice(self._snapshots, self._snapshots + len(snapshots))
+        group.resize_dimension("time", rows.stop)
+        for k, record in enumerate(snapshots, start=self._snapshots):
+            present = ~record.points.get("removed", np.zeros(len(record.points["x"]), bool))
+            for name in POINTS:
+                if name in group.variables and name in record.points:
+                    values = np.asarray(record.points[name])[present]
+                    group[name][k, : len(values)] = values.astype("f4")
+        group["time"][rows] = [record.time for record in snapshots]
+
+
+def geometry_attributes(scene):
+    """Tunnels and gate as attributes [m, degree], for figures that read datasets only."""
+    attributes = {}
+    if scene.tunnels:
+        attributes |= {
+            "tunnel_x": np.array([t.x for t in scene.tunnels]),
+            "tunnel_axis_depth": np.array([t.axis_depth for t in scene.tunnels]),
+            "tunnel_outer_radius": np.array([t.outer_radius for t in scene.tunnels]),
+            "tunnel_inner_radius": np.array([t.inner_radius for t in scene.tunnels]),
+        }
+    if scene.gate is not None:
+        attributes |= {
+            "gate_tunnel": np.int64(scene.gate.tunnel),
+            "gate_angle": float(scene.gate.angle),
+            "gate_width": float(scene.gate.width),
+        }
+    return attributes
+
+
+def write_attributes(path, **attributes):
+    """Set root attributes of a run file."""
+    with _append_to(path) as file:
+        for name, value in attributes.items():
+            file.attrs[name] = value
+
+
+def write_response(path, response, model="beam-spring"):
+    """Write the response of a lining model to `/structure/<model>`, in place of an earlier one."""
+    import h5py
+
+    with h5py.File(path, "a", locking=False) as file:
+        structure = file.require_group("structure")
+        if model in structure:
+            del structure[model]
+    response.to_netcdf(path, mode="a", group=f"structure/{model}", engine="h5netcdf")
+
+
+def _write_mesh(group, mesh, geometry):
+    for key, value in geometry.items():
+        group.attrs[key] = value
+    group.dimensions.update({"node": len(mesh.nodes), "element": len(mesh.elements), "corner": 3})
+    _variable(group, "x", ("node",), "f8", ("m", "horizontal position of the node"))[:] = mesh.nodes[:, 0]
+    _variable(group, "y", ("node",), "f8", ("m", "vertical position of the node"))[:] = mesh.nodes[:, 1]
+    corners = _variable(group, "element_nodes", ("element", "corner"), "i4", ("1", "nodes, counter-clockwise, from 0"))
+    corners[:] = mesh.elements
+    region = _variable(group, "region", ("element",), "i1", ("1", "part of the mesh"))
+    region[:] = mesh.region
+    region.attrs["flag_values"] = np.arange(4, dtype="i1")
+    region.attrs["flag_meanings"] = "soil channel interior headroom"
+
+
+def _variable(group, name, dimensions, kind, meaning, chunks=None, fill=None, compress=False):
+    options = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if compress else {}
+    variable = group.create_variable(name, dimensions, kind, chunks=chunks, fillvalue=fill, **options)
+    variable.attrs["units"], variable.attrs["long_name"] = meaning
+    return variable
+
+
+def _append_to(path):
+    import h5netcdf
+
+    # without locks, a reader that holds the file cannot break the run
+    return h5netcdf.File(path, "a", locking=False)
+
+
+def _limit_flag(name):
+    return DT_LIMITS.index(name) if name in DT_LIMITS else len(DT_LIMITS) - 1
+
+
+# -- reading --------------------------------------------------------------------------------------
+
+
+def run_file(path):
+    """The run file for a run folder or a file; raises `RunFileError` when there is none."""
+    path = Path(path)
+    file = path / "run.nc" if path.is_dir() else path
+    if not file.is_file():
+        raise RunFileError(f"run '{path}': there is no {'run.nc in it' if path.is_dir() else 'such file or folder'}; "
+                           "give the folder that `gush run` wrote")  # fmt: skip
+    return file
+
+
+def read_run(path):
+    """All groups of a run as an `xarray.DataTree`, in memory; groups as in the module's description."""
+    import xarray as xr
+
+    file = run_file(path)
+    try:
+        names = _group_names(file)
+    except Exception as error:
+        raise RunFileError(_why_unreadable(file, None, error)) from error
+    return xr.DataTree.from_dict({"/": _read(file, None), **{f"/{name}": _read(file, name) for name in names}})
+
+
+def _group_names(file):
+    import h5netcdf
+
+    with h5netcdf.File(file, "r") as content:
+        names = [name for name in content.groups if name != "structure"]
+        if "structure" in content.groups:
+            names += [f"structure/{model}" for model in content["structure"].groups]
+    return names
+
+
+def read_attributes(path):
+    """Root attributes of a run: provenance, scene text, status."""
+    return dict(_read(run_file(path), None).attrs)
+
+
+def read_pressures(path):
+    """Pressures on the lining through time: `/lining`, in memory.
+
+    Returns
+    -------
+    xarray.Dataset
+        soil_pressure, water_pressure, soil_shear and spreads (time, [tunnel,] theta) [Pa]; inflow_mass [kg/m],
+        flow_zone_area and disturbed_area [m2] on time.
+
+    Raises
+    ------
+    RunFileError
+        When the file is missing, not netCDF, truncated, or not a run.
+    """
+    return read_group(path, "lining")
+
+
+def read_history(path):
+    """Inflow, zones, balances and time step through time: `/history`, in memory."""
+    return read_group(path, "history")
+
+
+def read_points(path, snapshot=None):
+    """Snapshots of all points: `/points`, in memory; one of them when its number is given (-1: the last)."""
+    return read_group(path, "points", snapshot)
+
+
+def read_mesh(path):
+    """The mesh: `/mesh`, in memory."""
+    return read_group(path, "mesh")
+
+
+def read_response(path, model="beam-spring"):
+    """The response of the lining: `/structure/<model>`, in memory."""
+    return read_group(path, f"structure/{model}")
+
+
+def read_group(path, group, row=None):
+    """One group of a run file, in memory, with complete records only; `row` picks one of them."""
+    return _read(run_file(path), group, row)
+
+
+def _read(file, group, row=None):
+    import xarray as xr
+
+    try:
+        with xr.open_dataset(file, group=group, engine="h5netcdf", decode_times=False) as dataset:
+            if "time" in dataset.coords:
+                # a batch cut short by a kill has no time yet: it was written last
+                complete = np.isfinite(np.atleast_1d(dataset["time"].values))
+                if not complete.all():
+                    dataset = dataset.isel(time=np.flatnonzero(complete))
+                if row is not None:
+                    if not dataset.sizes["time"]:
+                        raise RunFileError(f"run file '{file}': group '{group}' has no complete record yet")
+                    dataset = dataset.isel(time=row)
+            return dataset.load()
+    except RunFileError:
+        raise
+    except Exception as error:
+        raise RunFileError(_why_unreadable(file, group, error)) from error
+
+
+def _why_unreadable(file, group, error):
+    try:
+        size = os.path.getsize(file)
+        with open(file, "rb") as stream:
+            signature = stream.read(8)
+    except OSError as reason:
+        return f"run file '{file}': cannot be read: {reason.strerror}; check its permissions"
+    if signature != b"\x89HDF\r\n\x1a\n":
+        return f"run file '{file}': not a netCDF-4 file ({size} bytes); give the run.nc that `gush run` wrote"
+    if "truncated" in str(error) or "eof" in str(error).lower():
+        return (
+            f"run file '{file}': truncated, its end is missing ({size} bytes are left); copy it again or repeat the run"
+        )
+    if group is not None and ("group not found" in str(error).lower() or isinstance(error, (KeyError, OSError))):
+        return f"run file '{file}': has no group '/{group}'; " + (
+            "run `gush respond` first" if group.startswith("structure") else "it is not a run file, or it is damaged"
+        )
+    return f"run file '{file}': damaged ({type(error).__name__}: {error}); copy it again or repeat the run"

@@ -1,0 +1,141 @@
+"""What a run would do and cost, before it starts: the table and the JSON of `gush plan`."""
+
+import math
+import time as clock
+
+from coupling.run import check_memory, free_memory_bytes
+
+WARM_UP_STEPS, MEASURED_SPELLS, SECONDS_A_SPELL = 10, 5, 0.3
+# Inflow of grains over that of free discharge under the head at the gate, from trial runs of case 3: a rough guess
+# that only the expected duration uses.
+DISCHARGE_SHARE = 0.03
+
+
+def plan(scene, threads=None):
+    """Build the mesh and the points of a scene, take a few steps, and say what the run will cost.
+
+    Parameters
+    ----------
+    scene : coupling.Scene
+    threads : int or None
+
+    Returns
+    -------
+    dict
+        scene; features: list of {feature, active, reason}; elements, nodes, points; min_altitude [m]; min_angle
+        [degree]; dt [s]; dt_limit; stop_time [s] or None; stop_inflow_mass [kg/m] or None; steps_at_most (None without
+        a stop time); expected_time [s] and expected_steps: rough where the run stops at an inflow mass; records;
+        memory_bytes, free_memory_bytes; point_steps_per_second: measured now; expected_seconds: of stepping, without
+        mesh, relaxation and pictures.
+    """
+    import mpm
+
+    check_memory(scene.mpm)
+    mesh = mpm.build_mesh(scene.mpm)
+    solver = mpm.Solver(scene.mpm, mesh, threads)
+    dt, limit = solver.time_step_estimate()
+    rate = _measured_rate(solver)
+    stop = scene.mpm.stop
+    time = expected_time(scene.mpm)
+    return {
+        "scene": scene.name,
+        "features": features(scene, solver.threads),
+        "elements": len(mesh.elements),
+        "nodes": len(mesh.nodes),
+        "points": int(solver.n_points),
+        "min_altitude": float(mesh.quality["min_altitude"]),
+        "min_angle": float(mesh.quality["min_angle"]),
+        "dt": float(dt),
+        "dt_limit": limit,
+        "stop_time": stop.time,
+        "stop_inflow_mass": stop.inflow_mass,
+        "steps_at_most": None if stop.time is None else math.ceil(stop.time / dt),
+        "expected_time": time,
+        "expected_steps": math.ceil(time / dt),
+        "records": 1 + math.ceil(time / scene.mpm.output.interval),
+        "memory_bytes": int(solver.memory_bytes()),
+        "free_memory_bytes": free_memory_bytes(),
+        "point_steps_per_second": rate,
+        "expected_seconds": math.ceil(time / dt) * solver.n_points / rate,
+    }
+
+
+def expected_time(mpm_scene):
+    """Simulated time until the run stops [s]; a rough guess where an inflow mass stops it."""
+    stop = mpm_scene.stop
+    if stop.inflow_mass is None or mpm_scene.gate is None:
+        return stop.time
+    tunnel = mpm_scene.tunnels[mpm_scene.gate.tunnel]
+    depth = tunnel.axis_depth - tunnel.outer_radius * math.cos(math.radians(mpm_scene.gate.angle))
+    head = max(depth - mpm_scene.water.table_depth, 0.1 * depth)
+    soil = [layer for layer in mpm_scene.soils if layer.top_depth <= depth][-1]
+    discharge = math.sqrt(2 * mpm_scene.gravity * head) * mpm_scene.gate.width
+    inflow_rate = DISCHARGE_SHARE * discharge * (1 - soil.porosity) * soil.grain_density
+    if inflow_rate == 0:
+        return stop.time
+    time = stop.inflow_mass / inflow_rate
+    return time if stop.time is None else min(time, stop.time)
+
+
+def features(scene, threads):
+    """What is active in a scene, what is left out, and why: list of {feature, active, reason}."""
+    s, numerics = scene.mpm, scene.mpm.numerics
+    plastic = [soil.name for soil in s.soils if soil.model == "mohr-coulomb"]
+    resting = [f"{t.friction_coefficient:g}" for t in s.tunnels if t.friction_coefficient > 0]
+    resolved = s.gate is not None and s.interior == "resolved"
+    inside = "no gate: nothing can enter" if s.gate is None else "sink: what leaves the channel is counted and removed"
+    if resolved:
+        inside = "material falls, piles up, can choke the gate"
+    snapshots = s.output.snapshot_interval
+    table = (
+        ("pore water", True, f"water table {s.water.table_depth:g} m below the surface"),
+        (
+            "Mohr-Coulomb return mapping",
+            bool(plastic),
+            f"soils {', '.join(plastic)}" if plastic else "all soils are elastic",
+        ),
+        ("gate", s.gate is not None, f"{s.gate.width:g} m at {s.gate.angle:g} deg" if s.gate else "the scene has none"),
+        (
+            "friction on the lining",
+            bool(resting),
+            f"coefficient {', '.join(resting)}" if resting else "no lining with friction",
+        ),
+        ("tunnel interior", resolved, inside),
+        (
+            "volumetric smoothing",
+            numerics.volumetric_smoothing,
+            "against locking of linear triangles" if numerics.volumetric_smoothing else "switched off in [numerics]",
+        ),
+        (
+            "pressure filter",
+            numerics.pressure_filter > 0,
+            f"{numerics.pressure_filter:g} of the checkerboard mode a step" if numerics.pressure_filter else "set to 0",
+        ),
+        ("motion of the lining", False, f"lining = '{s.lining}'"),
+        ("half model", False, "the whole box is computed, also for symmetric scenes"),
+        (
+            "snapshots of the points",
+            snapshots is not None,
+            f"every {snapshots:g} s" if snapshots else "only the first and the last: no snapshot_interval",
+        ),
+        ("several threads", threads > 1, f"{threads} threads" if threads > 1 else "one core, or too few elements"),
+        (
+            "ring response",
+            scene.ring is not None,
+            f"beam-spring, {len(scene.ring.joint_angles)} joints" if scene.ring else "the scene has no [ring]",
+        ),
+    )
+    return [{"feature": name, "active": bool(active), "reason": reason} for name, active, reason in table]
+
+
+def _measured_rate(solver):
+    """Point-steps per second of wall time with the gate closed: the best of some short spells."""
+    for _ in range(WARM_UP_STEPS):
+        solver.step()
+    rates = []
+    for _ in range(MEASURED_SPELLS):
+        before, begin = solver.point_steps, clock.monotonic()
+        while clock.monotonic() - begin < SECONDS_A_SPELL:
+            solver.step()
+        rates.append((solver.point_steps - before) / (clock.monotonic() - begin))
+    return max(rates)

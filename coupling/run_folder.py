@@ -1,0 +1,100 @@
+"""The folder of a run: chosen, checked and locked before anything starts, so that nothing existing is lost."""
+
+import contextlib
+import fcntl
+import os
+from pathlib import Path
+
+RUN_FILE, MESH_FILE, SCENE_FILE, LOG_FILE, FIGURES = "run.nc", "mesh.vtu", "scene.toml", "run.log", "figures"
+LOCK_FILE = ".lock"
+
+
+class RunRefused(ValueError):
+    """A run that must not start: rule, name, value, remedy."""
+
+
+def default_folder(scene_name):
+    """`runs/<scene>` in the current folder, numbered when that one is taken: an earlier run is never replaced."""
+    number, folder = 1, Path("runs") / scene_name
+    while folder.exists() and _content(folder) != []:
+        number += 1
+        folder = Path("runs") / f"{scene_name}-{number}"
+    return folder
+
+
+@contextlib.contextmanager
+def claimed(folder, overwrite=False):
+    """Hold a run folder for the time of a run; refuse before anything is touched.
+
+    Parameters
+    ----------
+    folder : str or path
+        Made when absent.
+    overwrite : bool
+        Replace an earlier run's own files; others are left alone.
+
+    Raises
+    ------
+    RunRefused
+        Not a folder, in use by another run, not writable, or not empty and `overwrite` not asked for.
+    """
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise RunRefused(f"output folder '{folder}': it, or one above it, is a file; choose another --out") from None
+    except OSError as error:
+        raise RunRefused(f"output folder '{folder}': cannot be made: {error.strerror}; choose another --out") from None
+    lock = _lock(folder)
+    try:
+        content = _content(folder)
+        if content and not overwrite:
+            shown = ", ".join(content[:3]) + (", .." if len(content) > 3 else "")
+            raise RunRefused(
+                f"output folder '{folder}': not empty, it holds {shown}; choose another --out, "
+                "or ask for --overwrite (overwrite=True) to replace the run in it"
+            )
+        for name in (RUN_FILE, MESH_FILE, SCENE_FILE, LOG_FILE):
+            (folder / name).unlink(missing_ok=True)
+        for picture in (folder / FIGURES).glob("*.png"):
+            picture.unlink()
+        yield folder
+    finally:
+        with contextlib.suppress(OSError):
+            (folder / LOCK_FILE).unlink()
+        os.close(lock)
+
+
+def _lock(folder):
+    """Take the lock; the system drops it when the process ends, however it ends."""
+    path = folder / LOCK_FILE
+    while True:
+        try:
+            lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        except OSError as error:
+            raise RunRefused(
+                f"output folder '{folder}': not writable: {error.strerror}; choose another --out or change its rights"
+            ) from None
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            holder = os.read(lock, 20).decode(errors="replace").strip()
+            os.close(lock)
+            raise RunRefused(
+                f"output folder '{folder}': in use by another run (process {holder or 'unknown'}); "
+                "wait for it or choose another --out"
+            ) from None
+        # a run that ended in between took the file away under us
+        with contextlib.suppress(FileNotFoundError):
+            if os.stat(path).st_ino == os.fstat(lock).st_ino:
+                os.truncate(lock, 0)
+                os.write(lock, f"{os.getpid()}\n".encode())
+                return lock
+        os.close(lock)
+
+
+def _content(folder):
+    """Names in a folder besides the lock; a file in its place counts as content."""
+    if not folder.is_dir():
+        return [folder.name]
+    return sorted(entry.name for entry in folder.iterdir() if entry.name != LOCK_FILE)

@@ -1,0 +1,226 @@
+"""The command line refuses bad input with one message and code 2, and never overwrites without being asked."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from types import SimpleNamespace
+
+import pytest
+from synthetic_run import make_quick_scene, record
+from typer.testing import CliRunner
+
+import mpm
+from coupling import datasets
+from coupling.cli import ProgressLine, app
+from coupling.run import check_memory, run
+from coupling.run_folder import RunRefused, claimed, default_folder
+
+HEAVY = ("numba", "xarray", "matplotlib", "pint", "scipy", "skfem", "gmsh", "numpy")
+
+
+class Bare:
+    """A mesh for runs that are not simulated."""
+
+    def __init__(self):
+        from test_figures import TwoTriangles
+
+        self.nodes, self.elements, self.region = TwoTriangles.nodes, TwoTriangles.elements, TwoTriangles.region
+        self.quality = {"n_elements": 2}
+
+    def save(self, path):
+        path.write_text("<mesh/>")
+
+
+@pytest.fixture
+def simulated(monkeypatch):
+    """Replaces meshing and simulation by synthetic records; `ending` is what is raised after them."""
+    state = SimpleNamespace(ending=None)
+
+    def simulate(scene, mesh, threads, progress):
+        for k in range(3):
+            progress({"stage": "gush", "time": 0.1 * k, "inflow_mass": 30.0 * k, "dt": 1e-4, "dt_limit": "acoustic",
+                      "point_steps_per_second": 5e6, "step": k})  # fmt: skip
+            yield record(0.1 * k, snapshot=k != 1)
+        if state.ending is not None:
+            raise state.ending
+
+    monkeypatch.setitem(vars(mpm), "simulate", simulate)
+    monkeypatch.setitem(vars(mpm), "build_mesh", lambda scene: Bare())
+    return state
+
+
+def gush(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def test_help_loads_no_heavy_library():
+    code = (
+        "import sys\nfrom coupling.cli import app\n"
+        "try:\n    app(['--help'])\nexcept SystemExit:\n    pass\n"
+        f"sys.exit(', '.join(name for name in {HEAVY} if name in sys.modules) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stderr == "" and done.returncode == 0 and "plan" in done.stdout
+
+
+def test_run_writes_everything_and_prints_a_table(simulated, tmp_path):
+    result = gush("run", "quick", "--out", tmp_path / "a", "--json", tmp_path / "a.json")
+    assert result.exit_code == 0, result.output
+    assert "inflow mass" in result.output and "60 kg/m" in result.output
+    assert {"run.nc", "mesh.vtu", "scene.toml", "run.log", "figures"} == {p.name for p in (tmp_path / "a").iterdir()}
+    data = json.loads((tmp_path / "a.json").read_text())
+    assert data["status"] == "finished" and data["inflow_mass"] == 60.0 and len(data["figures"]) == 6
+    assert data["soil_pressure"]["crown"]["initial"] == pytest.approx(180e3, rel=1e-3)
+    assert data["response"]["axial_force"]["final"]["max"] > 0
+    again = gush("respond", tmp_path / "a", "--json", tmp_path / "b.json")
+    assert again.exit_code == 0, again.output
+    assert json.loads((tmp_path / "b.json").read_text())["axial_force"] == data["response"]["axial_force"]
+
+
+def test_scene_file_of_a_run_gives_the_same_scene(simulated, tmp_path):
+    import coupling
+
+    scene = make_quick_scene()
+    run(scene, tmp_path / "a")
+    assert coupling.load_scene(tmp_path / "a" / "scene.toml") == scene
+
+
+def test_nothing_is_overwritten_without_being_asked(simulated, tmp_path):
+    folder = tmp_path / "a"
+    run(make_quick_scene(), folder)
+    before = (folder / "run.nc").read_bytes()
+    (folder / "notes.txt").write_text("mine")
+    refused = gush("run", "quick", "--out", folder)
+    assert refused.exit_code == 2 and "--overwrite" in refused.output
+    assert (folder / "run.nc").read_bytes() == before
+    assert gush("run", "quick", "--out", folder, "--overwrite", "--no-figures", "--quiet").exit_code == 0
+    assert (folder / "notes.txt").read_text() == "mine"
+
+
+def test_default_folder_is_numbered_when_taken(simulated, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    folders = [run(make_quick_scene()).attrs["run"] for _ in range(3)]
+    assert folders == [os.path.join("runs", name) for name in ("quick", "quick-2", "quick-3")]
+    assert str(default_folder("case-3")) == os.path.join("runs", "case-3")
+
+
+def test_folder_in_use_is_refused(simulated, tmp_path):
+    with claimed(tmp_path / "a"):
+        result = gush("run", "quick", "--out", tmp_path / "a", "--overwrite")
+        assert result.exit_code == 2 and f"in use by another run (process {os.getpid()})" in result.output
+    assert gush("run", "quick", "--out", tmp_path / "a", "--no-figures").exit_code == 0
+
+
+def test_folder_that_cannot_be_made_is_refused(tmp_path):
+    (tmp_path / "file").write_text("")
+    for out in (tmp_path / "file", tmp_path / "file" / "below", "/proc/gush"):
+        result = gush("run", "quick", "--out", out)
+        assert result.exit_code == 2 and "choose another --out" in result.output
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[[soils]]\nporosity = 45", "porosity"),
+        ("[gate]\nwidth = 5.0", "gate"),
+        ("[[tunnels]]\nx = 60.0\ncover = 20.0\nouter_diameter = 6.6\ninner_diameter = 5.9\nfriction_coefficient = 0.2",
+         "outside the box"),
+        ("[water]\ndensty = 1000.0", "density"),
+        ("[discretisation]\nelement_size = 0.001", "memory"),
+        ("this is no TOML", "TOML"),
+    ],
+)  # fmt: skip
+def test_bad_scene_is_refused_with_its_reason(tmp_path, text, message):
+    file = tmp_path / "scene.toml"
+    file.write_text('base = "quick"\n' + text)
+    for command in (("run", file, "--out", tmp_path / "a"), ("plan", file)):
+        result = gush(*command)
+        assert result.exit_code == 2 and message in result.output, result.output
+    assert not (tmp_path / "a").exists()
+
+
+def test_unknown_scene_suggests_a_name():
+    result = gush("run", "quik")
+    assert result.exit_code == 2 and "did you mean 'quick'" in result.output
+
+
+def test_truncated_run_is_refused(simulated, tmp_path):
+    run(make_quick_scene(), tmp_path / "a")
+    file = tmp_path / "a" / "run.nc"
+    file.write_bytes(file.read_bytes()[:-100])
+    result = gush("respond", tmp_path / "a")
+    assert result.exit_code == 2 and "truncated" in result.output
+
+
+def test_too_little_memory_is_refused(monkeypatch):
+    monkeypatch.setattr(sys.modules["coupling.run"], "free_memory_bytes", lambda: 1_000_000)
+    with pytest.raises(RunRefused, match="raise element_size"):
+        check_memory(make_quick_scene().mpm)
+
+
+def test_failed_run_keeps_its_output_and_says_where(simulated, tmp_path):
+    simulated.ending = mpm.RunFailed("a material point became non-finite", 0.2, (1.0, -20.0))
+    result = gush("run", "quick", "--out", tmp_path / "a")
+    assert result.exit_code == 3
+    assert "t = 0.2 s" in result.output and str(tmp_path / "a") in result.output
+    assert datasets.read_attributes(tmp_path / "a")["status"] == "failed"
+    assert datasets.read_pressures(tmp_path / "a").sizes["time"] == 3
+
+
+def test_interrupted_run_keeps_its_output(simulated, tmp_path):
+    simulated.ending = KeyboardInterrupt()
+    assert gush("run", "quick", "--out", tmp_path / "a").exit_code == 130
+    assert datasets.read_attributes(tmp_path / "a")["status"] == "interrupted"
+    assert datasets.read_pressures(tmp_path / "a").sizes["time"] == 3
+
+
+def test_ctrl_c_in_a_real_run_leaves_a_readable_file(tmp_path):
+    process = subprocess.Popen(
+        [sys.executable, "-m", "coupling.cli", "run", "quick", "--out", str(tmp_path / "a"), "--no-figures"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+    )
+    deadline = time.monotonic() + 120  # compilation on a busy machine
+    while not _has_records(tmp_path / "a") and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    message = process.communicate(timeout=60)[1].decode()
+    assert process.returncode == 130, message
+    assert datasets.read_attributes(tmp_path / "a")["status"] == "interrupted"
+    assert datasets.read_pressures(tmp_path / "a").sizes["time"] >= 1
+
+
+def _has_records(folder):
+    try:
+        return datasets.read_pressures(folder).sizes["time"] > 0
+    except datasets.RunFileError:
+        return False
+
+
+def test_scenes_are_listed():
+    result = gush("scenes", "--json", "-")
+    names = [row["name"] for row in json.loads(result.output)["scenes"]]
+    assert names[0] == "quick" and {"case-1", "case-10", "twin-tunnels"} <= set(names)
+
+
+def test_plan_says_what_is_left_out_and_why(tmp_path):
+    result = gush("plan", "quick", "--json", tmp_path / "plan.json")
+    assert result.exit_code == 0, result.output
+    data = json.loads((tmp_path / "plan.json").read_text())
+    assert data["points"] > data["elements"] > 0 and data["expected_steps"] <= data["steps_at_most"]
+    left_out = {row["feature"]: row["reason"] for row in data["features"] if not row["active"]}
+    assert left_out["motion of the lining"] == "lining = 'fixed'"
+
+
+def test_progress_line_names_the_limit_and_the_time_left():
+    line = ProgressLine(make_quick_scene().mpm.stop)
+    state = {"stage": "gush", "time": 0.1, "inflow_mass": 50.0, "dt": 1e-4, "dt_limit": "acoustic",
+             "point_steps_per_second": 8e6}  # fmt: skip
+    line.text(state)
+    line._begin -= 10.0
+    text = line.text(state)
+    for part in ("t 0.100 s", "inflow 50 kg/m", "dt 100 µs (acoustic)", "8.0 M point-steps/s", "10 s left"):
+        assert part in text

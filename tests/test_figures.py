@@ -1,0 +1,140 @@
+"""Pictures show the numbers of their datasets, in the units that their labels name."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+from synthetic_run import make_quick_scene, record
+
+from coupling import datasets, figures
+from coupling.provenance import root_attributes
+from coupling.run import respond
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """File of a synthetic run with a response."""
+    path = tmp_path_factory.mktemp("run") / "run.nc"
+    scene = make_quick_scene()
+    writer = datasets.RunWriter(path, root_attributes(scene), scene.mpm, TwoTriangles())
+    for time in (0.0, 0.5, 1.0):
+        writer.append(record(time, snapshot=True))
+    writer.close("finished")
+    datasets.write_response(path, respond(scene, datasets.read_pressures(path)))
+    return path
+
+
+class TwoTriangles:
+    """The least that a mesh must have to be stored."""
+
+    nodes = np.array([[3.0, -23.0], [4.0, -23.0], [4.0, -24.0], [3.0, -24.0]])
+    elements = np.array([[0, 2, 1], [0, 3, 2]])
+    region = np.array([0, 1])
+
+
+def line(axis, label):
+    (found,) = [item for item in axis.lines if item.get_label() == label]
+    return found
+
+
+def test_polar_pressures_are_drawn_in_kilopascal(run):
+    pressures = datasets.read_pressures(run)
+    figure = figures.pressures_polar(pressures)
+    for axis, name in zip(figure.axes, ("soil_pressure", "water_pressure"), strict=True):
+        assert "[kPa]" in axis.get_title()
+        angle, drawn = line(axis, "initial").get_data()
+        np.testing.assert_allclose(drawn[:-1], pressures[name].isel(time=0) / 1e3)
+        np.testing.assert_allclose(np.degrees(angle[:-1]), pressures["theta"])
+        np.testing.assert_allclose(line(axis, "1 s, 300 kg/m").get_ydata()[:-1], pressures[name].isel(time=-1) / 1e3)
+        assert np.degrees(line(axis, "gate").get_xdata()) == pytest.approx(90.0)
+        assert axis.get_theta_direction() == -1
+
+
+def test_internal_forces_are_drawn_in_kilonewton_with_their_extremes(run):
+    response = datasets.read_response(run)
+    figure = figures.internal_forces(response)
+    units = {"axial_force": "[kN/m]", "shear_force": "[kN/m]", "bending_moment": "[kN m/m]"}
+    for axis, (name, unit) in zip(figure.axes, units.items(), strict=True):
+        assert unit in axis.get_title()
+        np.testing.assert_allclose(line(axis, "initial").get_ydata()[:-1], response[name].isel(time=0) / 1e3)
+        assert f"max {float(response[name].isel(time=-1).max()) / 1e3:.0f} at" in axis.get_xlabel().replace(
+            "\N{MINUS SIGN}", "-"
+        )
+
+
+def test_deformed_ring_is_drawn_relative_to_its_mean_motion():
+    theta = np.arange(0.5, 360.0)
+    angle = np.radians(theta)
+    shape = 0.01 * np.cos(2 * angle)
+    # a sideways and downward motion of the whole ring is no deformation
+    radial = shape + 0.03 * np.sin(angle) - 0.02 * np.cos(angle)
+    tangential = 0.03 * np.cos(angle) + 0.02 * np.sin(angle)
+    response = xr.Dataset(
+        {
+            "displacement_radial": (("time", "theta"), [radial, radial]),
+            "displacement_tangential": (("time", "theta"), [tangential, tangential]),
+        },
+        coords={"time": [0.0, 1.0], "theta": theta},
+        attrs={"ring": '{"outer_diameter": 6.6, "inner_diameter": 5.9}'},
+    )
+    axis = figures.deformed_ring(response).axes[0]
+    x, y = line(axis, "initial").get_data()
+    drawn = np.hypot(x, y)[:-1] - 3.125
+    factor = drawn[0] / shape[0]
+    assert f"{factor:.0f} times" in axis.get_title() and "10.0 mm" in axis.get_title()
+    # the tangential part of a pure cos 2 shape is nil, so the radius changes by the radial part alone
+    np.testing.assert_allclose(drawn, factor * shape, atol=1e-12)
+    assert axis.get_xlabel() == "x [m]"
+
+
+def test_joints_are_numbered_with_rotation_and_opening(run):
+    response = datasets.read_response(run)
+    texts = [text.get_text().replace("\N{MINUS SIGN}", "-") for text in figures.deformed_ring(response).axes[0].texts]
+    assert len(texts) == 6
+    rotation = 1e3 * float(response["joint_rotation"].isel(time=-1, joint=1))
+    assert texts[1].startswith(f"2:  {rotation:+.2f} mrad")
+
+
+def test_inflow_is_drawn_over_time(run):
+    history = datasets.read_history(run)
+    upper, lower = figures.inflow(history).axes
+    np.testing.assert_allclose(upper.lines[0].get_data(), [history["time"], history["inflow_mass"]])
+    np.testing.assert_allclose(lower.lines[0].get_ydata(), history["flow_zone_area"])
+    assert "[kg/m]" in upper.get_ylabel() and "[m²]" in lower.get_ylabel() and "[s]" in lower.get_xlabel()
+
+
+def test_fields_show_every_point_in_view_and_name_their_units(run):
+    points = datasets.read_points(run, -1)
+    figure = figures.fields_around_tunnel(points)
+    panels = {axis.get_title(): axis.collections[0] for axis in figure.axes if axis.get_title()}
+    assert list(panels) == [
+        "displacement [mm]",
+        "deviatoric strain [-]",
+        "pore pressure [kPa]",
+        "vertical effective stress [kPa]",
+    ]
+    pore = np.sort(panels["pore pressure [kPa]"].get_array())
+    expected = points["pore_pressure"].values
+    np.testing.assert_allclose(pore, np.sort(expected[np.isfinite(expected)]) / 1e3)
+    top = 1e3 * np.nanmax(np.abs(points["displacement_x"]))
+    assert panels["displacement [mm]"].get_array().max() == pytest.approx(float(top))
+
+
+def test_mesh_is_drawn_around_the_tunnel_and_around_the_gate(run):
+    figure = figures.mesh_near_gate(datasets.read_mesh(run))
+    assert [len(axis.collections[0].get_paths()) for axis in figure.axes] == [2, 2]
+
+
+def test_all_pictures_of_a_run_are_written(run, tmp_path):
+    written = figures.draw_run(run, tmp_path / "figures")
+    assert [path.name for path in written] == [
+        "mesh.png", "fields.png", "pressures.png", "internal_forces.png", "deformed_ring.png", "inflow.png",
+    ]  # fmt: skip
+    assert all(path.read_bytes().startswith(b"\x89PNG") for path in written)
+
+
+def test_drawing_leaves_pyplot_alone():
+    code = "import sys, coupling.figures; sys.exit('matplotlib.pyplot' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
