@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from mpm.jit import kernel
+from mpm.transfer import map_point
 from mpm.variables import C_RETURNED, MASS, POINT_WIDTH, SXX, SYY, SZZ, X0, Y0, N, P, X, Y
 
 
@@ -236,14 +237,26 @@ def update_order(element_of_point, moved_point, moved_from, n_moved, start, orde
 
 
 @kernel
-def relocate(element_of_point, points, geometry, neighbours, clamps, moved_point, moved_from):
-    """Find the new element of every point that left its own, walking over neighbours.
+def relocate(
+    element_of_point, points, soil_of_point, soils, density_liquid, elements, geometry, neighbours, nodes, wave_speed,
+    volume, sums, clamps, moved_point, moved_from,
+):  # fmt: skip
+    """Find the new element of every point that left its own, walking over neighbours, and map it there.
 
     A point that would cross the boundary of the mesh is put back on it (and counted); one that
     crosses an outflow edge (neighbour -2) is taken out: element -1. The points that changed their
     element and the elements that they left are written to `moved_point`, `moved_from` in ascending
-    order of points; returns their number and that of the points taken out.
+    order of points.
+
+    Returns
+    -------
+    n_moved, removed : int
+        Number of points that changed their element, and of points taken out.
+    limit, limit_speed : float
+        As of `update_points`, over the points relocated.
     """
+    limit = np.inf
+    limit_speed = 0.0
     removed = 0
     n_moved = 0
     for i in range(element_of_point.size):
@@ -297,4 +310,14 @@ def relocate(element_of_point, points, geometry, neighbours, clamps, moved_point
             moved_point[n_moved] = i
             moved_from[n_moved] = left
             n_moved += 1
-    return n_moved, removed
+        if e >= 0:
+            added, fastest = map_point(
+                points[i], soils[soil_of_point[i]], density_liquid, elements[e], geometry[e], nodes, sums
+            )
+            volume[e] += added
+            fastest = np.sqrt(fastest)
+            local = geometry[e, 7] / (wave_speed + fastest)
+            if local < limit:
+                limit = local
+                limit_speed = fastest
+    return n_moved, removed, limit, limit_speed

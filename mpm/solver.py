@@ -11,7 +11,7 @@ from mpm import stages
 from mpm.contact import FIXED_X, FIXED_Y, remap_nodes, smooth_rates, solve_nodes
 from mpm.points import fill, initial_stress, relocate, sort_by_element, update_order
 from mpm.time_step import critical_time_step, fast_wave_speed
-from mpm.transfer import advance_points, element_rates, points_to_nodes, update_points
+from mpm.transfer import advance_points, element_rates, update_points
 from mpm.variables import (
     BUFFER_WIDTH,
     CLAMPS,
@@ -93,6 +93,7 @@ class Solver:
         # the projection of the initial pore pressure: hydrostatic, exact for linear functions
         _, pressure = initial_stress(scene, -mesh.nodes[:, 1])
         self.nodes[:, V_P] = pressure
+        self._mapped = False  # whether `sums` holds the points as they are
         self.removed_mass = 0.0
         self.suspended = 0
         self.gate_open = False
@@ -247,7 +248,9 @@ class Solver:
 
     def time_step_estimate(self):
         """Time step of the state at hand [s] and the name of what limits it."""
-        return critical_time_step(self.map_points(), self.wave_speed, self.scene.numerics.courant)
+        if not self._mapped:
+            self.map_points()
+        return critical_time_step(self._limits, self.wave_speed, self.scene.numerics.courant)
 
     def points_by_name(self):
         """Copy of the state of all points, one array a variable, with volume, displacement and soil number."""
@@ -262,11 +265,17 @@ class Solver:
     # -- stages ---------------------------------------------------------------------------------
 
     def map_points(self):
-        """Sum the points at the nodes without moving anything; returns the step limits of the parts."""
+        """Sum the points at the nodes without advancing anything; sets the limits of the time step."""
+        self._limits = [o[3:] for o in self._update_points(0.0, False)]
+        self._mapped = True
+
+    def _update_points(self, dt, advance):
+        water, numerics = self.scene.water, self.scene.numerics
         return self.over_elements(
-            points_to_nodes, self.occupied, self.start, self.order, self.points, self.soil_of_point, self.soils,
-            self.scene.water.density, self.mesh.elements, self.geometry, self.nodes, self.wave_speed, self.volume,
-            per_range=(self.sums,),
+            update_points, self.occupied, self.start, self.order, self.points, self.soil_of_point, self.soils,
+            water.density, water.bulk_modulus, self.mesh.elements, self.geometry, self.nodes, self.rates, self.volume,
+            dt, advance, numerics.volumetric_smoothing, self.wave_speed, self.element_of_point,
+            per_range=(self.clamps, self.sums),
         )  # fmt: skip
 
     def relax(self, progress=None):
@@ -278,6 +287,7 @@ class Solver:
         steps, residual, reaction = stages.relax(
             self, friction, numerics.relaxation_tolerance, numerics.max_relaxation_steps, progress
         )
+        self._mapped = False
         self.impulse[:] = 0.0
         self.impulse[:, 0:3] = reaction
         self.impulse[:, 3:5] = reaction[:, 0:2] ** 2
@@ -296,7 +306,9 @@ class Solver:
         grid = (self.mesh.elements, self.geometry, self.nodes)
         wall = (self.fixed, self.contact_of_node, self.normal, self.active)
 
-        dt, limit = critical_time_step(self.map_points(), self.wave_speed, numerics.courant)
+        if not self._mapped:
+            self.map_points()
+        dt, limit = critical_time_step(self._limits, self.wave_speed, numerics.courant)
         if dt > dt_max:
             dt, limit = dt_max, "output"
         self.over_nodes(
@@ -311,11 +323,9 @@ class Solver:
         self.over_elements(element_rates, self.occupied, *grid, self.volume, self.rates, per_range=(self.divergences,))
         if numerics.volumetric_smoothing:
             self.over_nodes(smooth_rates, self.divergences, self.nodes)
-        outcome = self.over_elements(
-            update_points, *layout, water.bulk_modulus, *grid, self.rates, self.volume, dt,
-            numerics.volumetric_smoothing, self.element_of_point, per_range=(self.clamps,),
-        )  # fmt: skip
+        outcome = self._update_points(dt, True)
         self._check(outcome)
+        self._limits = [o[3:] for o in outcome]
         self.suspended = sum(o[2] for o in outcome)
         if any(o[0] for o in outcome):
             self._relocate()
@@ -328,9 +338,12 @@ class Solver:
         return dt, limit
 
     def _relocate(self):
-        n_moved, removed = relocate(
-            self.element_of_point, self.points, self.geometry, self.neighbours, self.clamps[0], *self._moved
-        )
+        n_moved, removed, *limit = relocate(
+            self.element_of_point, self.points, self.soil_of_point, self.soils, self.scene.water.density,
+            self.mesh.elements, self.geometry, self.neighbours, self.nodes, self.wave_speed, self.volume, self.sums[0],
+            self.clamps[0], *self._moved,
+        )  # fmt: skip
+        self._limits.append(tuple(limit))
         if removed:
             self.removed_mass = float(np.sum(self.points[self.element_of_point == -1, MASS]))
         if n_moved:

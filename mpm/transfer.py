@@ -78,149 +78,6 @@ from mpm.variables import (
 
 
 @kernel
-def points_to_nodes(
-    first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, elements, geometry, nodes,
-    wave_speed, volume, sums,
-):  # fmt: skip
-    """Sum masses, momenta, drag and internal forces of the points at the nodes.
-
-    Parameters
-    ----------
-    first, last : int
-        Range of `occupied`.
-    occupied, start, order : (n_occupied,), (n_elements + 1,), (n_points,) int32
-        Elements that hold points; points of element e are order[start[e]:start[e + 1]].
-    points : (n_points, 16) float64
-    nodes : (n_nodes, 13) float64
-        Read: the pressure projection of the last step.
-    wave_speed : float
-        [m/s]
-    volume : (n_elements,) float64
-        Written: material volume [m2].
-    sums : (n_nodes, 13) float64
-        Written: what these elements add to every node.
-
-    Returns
-    -------
-    tuple of two floats
-        Smallest altitude / (wave speed + point speed) [s] and the point speed there [m/s].
-    """
-    sums[:] = 0.0
-    limit = np.inf
-    limit_speed = 0.0
-    for k in range(first, last):
-        e = occupied[k]
-        g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
-        x0, y0 = geometry[e, 4], geometry[e, 5]
-        p0, p1, p2 = nodes[elements[e, 0], V_P], nodes[elements[e, 1], V_P], nodes[elements[e, 2], V_P]
-        ms0 = ms1 = ms2 = ml0 = ml1 = ml2 = mn0 = mn1 = mn2 = d0 = d1 = d2 = q0 = q1 = q2 = 0.0
-        sx0 = sx1 = sx2 = sy0 = sy1 = sy2 = lx0 = lx1 = lx2 = ly0 = ly1 = ly2 = 0.0
-        fxx = fxy = fyy = fp = total = fastest = 0.0
-        for j in range(start[e], start[e + 1]):
-            i = order[j]
-            row = points[i]
-            soil = soils[soil_of_point[i]]
-            m = row[MASS]
-            n = row[N]
-            v = m / (soil[S_RHO_S] * (1.0 - n))
-            dx = row[X] - x0
-            dy = row[Y] - y0
-            n1 = g1x * dx + g1y * dy
-            n2 = g2x * dx + g2y * dy
-            n0 = 1.0 - n1 - n2
-            ms0 += n0 * m
-            ms1 += n1 * m
-            ms2 += n2 * m
-            w = v * density_liquid
-            w0, w1, w2 = n0 * w, n1 * w, n2 * w
-            ml0 += w0
-            ml1 += w1
-            ml2 += w2
-            mn0 += n * w0
-            mn1 += n * w1
-            mn2 += n * w2
-            drag = n * soil[S_DRAG]
-            d0 += drag * w0
-            d1 += drag * w1
-            d2 += drag * w2
-            vx, vy = row[VSX], row[VSY]
-            sx0 += n0 * m * vx
-            sx1 += n1 * m * vx
-            sx2 += n2 * m * vx
-            sy0 += n0 * m * vy
-            sy1 += n1 * m * vy
-            sy2 += n2 * m * vy
-            ux, uy = row[VLX], row[VLY]
-            lx0 += w0 * ux
-            lx1 += w1 * ux
-            lx2 += w2 * ux
-            ly0 += w0 * uy
-            ly1 += w1 * uy
-            ly2 += w2 * uy
-            fastest = max(fastest, vx * vx + vy * vy, ux * ux + uy * uy)
-            p = max(row[P], 0.0)
-            r = v * (p - (n0 * p0 + n1 * p1 + n2 * p2))
-            q0 += n0 * r
-            q1 += n1 * r
-            q2 += n2 * r
-            fxx += v * (row[SXX] - p)
-            fyy += v * (row[SYY] - p)
-            fxy += v * row[SXY]
-            fp += v * p
-            total += v
-        volume[e] = total
-        fastest = np.sqrt(fastest)
-        local = geometry[e, 7] / (wave_speed + fastest)
-        if local < limit:
-            limit = local
-            limit_speed = fastest
-        g0x, g0y = -g1x - g2x, -g1y - g2y
-        b = sums[elements[e, 0]]
-        b[B_MS] += ms0
-        b[B_ML] += ml0
-        b[B_MN] += mn0
-        b[B_D] += d0
-        b[B_Q] += q0
-        b[B_PSX] += sx0
-        b[B_PSY] += sy0
-        b[B_PLX] += lx0
-        b[B_PLY] += ly0
-        b[B_FX] -= g0x * fxx + g0y * fxy
-        b[B_FY] -= g0x * fxy + g0y * fyy
-        b[B_FLX] += g0x * fp
-        b[B_FLY] += g0y * fp
-        b = sums[elements[e, 1]]
-        b[B_MS] += ms1
-        b[B_ML] += ml1
-        b[B_MN] += mn1
-        b[B_D] += d1
-        b[B_Q] += q1
-        b[B_PSX] += sx1
-        b[B_PSY] += sy1
-        b[B_PLX] += lx1
-        b[B_PLY] += ly1
-        b[B_FX] -= g1x * fxx + g1y * fxy
-        b[B_FY] -= g1x * fxy + g1y * fyy
-        b[B_FLX] += g1x * fp
-        b[B_FLY] += g1y * fp
-        b = sums[elements[e, 2]]
-        b[B_MS] += ms2
-        b[B_ML] += ml2
-        b[B_MN] += mn2
-        b[B_D] += d2
-        b[B_Q] += q2
-        b[B_PSX] += sx2
-        b[B_PSY] += sy2
-        b[B_PLX] += lx2
-        b[B_PLY] += ly2
-        b[B_FX] -= g2x * fxx + g2y * fxy
-        b[B_FY] -= g2x * fxy + g2y * fyy
-        b[B_FLX] += g2x * fp
-        b[B_FLY] += g2y * fp
-    return limit, limit_speed
-
-
-@kernel
 def advance_points(
     first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, elements, geometry, nodes,
     dt, flip_fraction, pressure_filter, sums,
@@ -334,10 +191,13 @@ def element_rates(first, last, occupied, elements, geometry, nodes, volume, rate
 
 @kernel
 def update_points(
-    first, last, occupied, start, order, points, soil_of_point, soils, bulk_liquid, elements, geometry, nodes,
-    rates, volume, dt, smoothing, element_of_point, clamps,
+    first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, bulk_liquid, elements,
+    geometry, nodes, rates, volume, dt, advance, smoothing, wave_speed, element_of_point, clamps, sums,
 ):  # fmt: skip
-    """Advance stress, pore pressure and porosity of the points of a range of elements, in place.
+    """Advance stress, pore pressure and porosity of the points of a range of elements, and map them to the nodes.
+
+    One pass does both, since passes over the points are what a step costs. `advance` False maps only.
+    Points that left their element are not mapped; `relocate` does that.
 
     Jaumann rate of effective stress; mass balance of the mixture for the pore pressure,
     dp/dt = -(K_w/n) [(1 - n) div v_s + n div v_l] (Jassim et al. 2013, opposite sign of p).
@@ -345,12 +205,26 @@ def update_points(
     porosity grains do not touch: no effective stress; and while the element is not full, closing
     the air between suspended lumps builds neither stress nor pressure.
 
+    Parameters
+    ----------
+    rates, volume : (n_elements, 6), (n_elements,) float64
+        Strain rates [1/s]; material volume [m2], read of the last and written for the next step.
+    element_of_point : (n_points,) int32
+        Written: -2 - element for a point that left its element.
+    sums : (n_nodes, 13) float64
+        Written: masses, momenta, drag and forces that these elements add to every node.
+
     Returns
     -------
-    tuple of three ints
-        Number of points that left their element, first point with a non-finite state or -1,
-        and number of suspended points.
+    moved, bad, suspended : int
+        Number of points that left their element, first point with a non-finite state or -1, and
+        number of suspended points.
+    limit, limit_speed : float
+        Smallest altitude / (wave speed + point speed) [s] and the point speed there [m/s].
     """
+    sums[:] = 0.0
+    limit = np.inf
+    limit_speed = 0.0
     moved = 0
     n_suspended = n_cavitated = n_floor = n_ceiling = n_tension = 0
     bad = -1
@@ -360,8 +234,12 @@ def update_points(
         g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
         x0, y0 = geometry[e, 4], geometry[e, 5]
         r = rates[e]
+        i0, i1, i2 = elements[e, 0], elements[e, 1], elements[e, 2]
+        p0, p1, p2 = nodes[i0, V_P], nodes[i1, V_P], nodes[i2, V_P]
+        ms0 = ms1 = ms2 = ml0 = ml1 = ml2 = mn0 = mn1 = mn2 = d0 = d1 = d2 = q0 = q1 = q2 = 0.0
+        sx0 = sx1 = sx2 = sy0 = sy1 = sy2 = lx0 = lx1 = lx2 = ly0 = ly1 = ly2 = 0.0
+        fxx = fxy = fyy = fp = total = fastest = 0.0
         if smoothing:
-            i0, i1, i2 = elements[e, 0], elements[e, 1], elements[e, 2]
             ts = third * (nodes[i0, V_TS] + nodes[i1, V_TS] + nodes[i2, V_TS])
             tl = third * (nodes[i0, V_TL] + nodes[i1, V_TL] + nodes[i2, V_TL])
         else:
@@ -381,50 +259,51 @@ def update_points(
             i = order[j]
             row = points[i]
             s = soils[soil_of_point[i]]
-            n = row[N]
-            p = row[P]
-            loose = n >= s[S_LOOSE]
-            row[EQ] += equivalent
-            if loose and p <= 0.0 and not full:
-                # lumps with air between them: shape changes, neither grains nor water are squeezed
-                row[SXX] = row[SYY] = row[SZZ] = row[SXY] = 0.0
-                row[P] = 0.0
-                n_suspended += 1
-            else:
-                p -= bulk_liquid / n * ((1.0 - n) * ts + n * tl)
-                row[P] = p
-                if p < 0.0:
-                    n_cavitated += 1
-                if not (loose and p <= 0.0 and ts > 0.0):
-                    n = 1.0 - (1.0 - n) * shrink
-                    if n < POROSITY_FLOOR:
-                        n = POROSITY_FLOOR
-                        n_floor += 1
-                    elif n > POROSITY_CEILING:
-                        n = POROSITY_CEILING
-                        n_ceiling += 1
-                    row[N] = n
-                if n >= s[S_LOOSE]:
+            if advance:
+                n = row[N]
+                p = row[P]
+                loose = n >= s[S_LOOSE]
+                row[EQ] += equivalent
+                if loose and p <= 0.0 and not full:
+                    # lumps with air between them: shape changes, neither grains nor water are squeezed
                     row[SXX] = row[SYY] = row[SZZ] = row[SXY] = 0.0
+                    row[P] = 0.0
                     n_suspended += 1
                 else:
-                    lam, shear = s[S_LAMBDA], s[S_G]
-                    sxx, syy, sxy = row[SXX], row[SYY], row[SXY]
-                    turn = 2.0 * spin * sxy
-                    txx = sxx - turn + lam * ts + 2.0 * shear * exx
-                    tyy = syy + turn + lam * ts + 2.0 * shear * eyy
-                    txy = sxy + spin * (sxx - syy) + 2.0 * shear * exy
-                    tzz = row[SZZ] + lam * ts
-                    if s[S_MODEL] != MODEL_ELASTIC:
-                        txx, tyy, tzz, txy, cut = mohr_coulomb(
-                            txx, tyy, tzz, txy, shear, s[S_K], s[S_C_COS], s[S_SIN], s[S_SIN_DIL], s[S_APEX],
-                            s[S_TENSION],
-                        )  # fmt: skip
-                        if cut > 0.0:
-                            n_tension += 1
-                    row[SXX], row[SYY], row[SZZ], row[SXY] = txx, tyy, tzz, txy
-            if bad < 0 and not np.isfinite(row[SXX] + row[P] + row[VSX] + row[VSY] + row[VLX] + row[VLY] + row[N]):
-                bad = i
+                    p -= bulk_liquid / n * ((1.0 - n) * ts + n * tl)
+                    row[P] = p
+                    if p < 0.0:
+                        n_cavitated += 1
+                    if not (loose and p <= 0.0 and ts > 0.0):
+                        n = 1.0 - (1.0 - n) * shrink
+                        if n < POROSITY_FLOOR:
+                            n = POROSITY_FLOOR
+                            n_floor += 1
+                        elif n > POROSITY_CEILING:
+                            n = POROSITY_CEILING
+                            n_ceiling += 1
+                        row[N] = n
+                    if n >= s[S_LOOSE]:
+                        row[SXX] = row[SYY] = row[SZZ] = row[SXY] = 0.0
+                        n_suspended += 1
+                    else:
+                        lam, shear = s[S_LAMBDA], s[S_G]
+                        sxx, syy, sxy = row[SXX], row[SYY], row[SXY]
+                        turn = 2.0 * spin * sxy
+                        txx = sxx - turn + lam * ts + 2.0 * shear * exx
+                        tyy = syy + turn + lam * ts + 2.0 * shear * eyy
+                        txy = sxy + spin * (sxx - syy) + 2.0 * shear * exy
+                        tzz = row[SZZ] + lam * ts
+                        if s[S_MODEL] != MODEL_ELASTIC:
+                            txx, tyy, tzz, txy, cut = mohr_coulomb(
+                                txx, tyy, tzz, txy, shear, s[S_K], s[S_C_COS], s[S_SIN], s[S_SIN_DIL], s[S_APEX],
+                                s[S_TENSION],
+                            )  # fmt: skip
+                            if cut > 0.0:
+                                n_tension += 1
+                        row[SXX], row[SYY], row[SZZ], row[SXY] = txx, tyy, tzz, txy
+                if bad < 0 and not np.isfinite(row[SXX] + row[P] + row[VSX] + row[VSY] + row[VLX] + row[VLY] + row[N]):
+                    bad = i
             dx = row[X] - x0
             dy = row[Y] - y0
             n1 = g1x * dx + g1y * dy
@@ -432,9 +311,144 @@ def update_points(
             if n1 < 0.0 or n2 < 0.0 or n1 + n2 > 1.0:
                 element_of_point[i] = -2 - e  # left: to be searched from e
                 moved += 1
+                continue
+            m = row[MASS]
+            n = row[N]
+            v = m / (s[S_RHO_S] * (1.0 - n))
+            n0 = 1.0 - n1 - n2
+            ms0 += n0 * m
+            ms1 += n1 * m
+            ms2 += n2 * m
+            w = v * density_liquid
+            w0, w1, w2 = n0 * w, n1 * w, n2 * w
+            ml0 += w0
+            ml1 += w1
+            ml2 += w2
+            mn0 += n * w0
+            mn1 += n * w1
+            mn2 += n * w2
+            drag = n * s[S_DRAG]
+            d0 += drag * w0
+            d1 += drag * w1
+            d2 += drag * w2
+            vx, vy = row[VSX], row[VSY]
+            sx0 += n0 * m * vx
+            sx1 += n1 * m * vx
+            sx2 += n2 * m * vx
+            sy0 += n0 * m * vy
+            sy1 += n1 * m * vy
+            sy2 += n2 * m * vy
+            ux, uy = row[VLX], row[VLY]
+            lx0 += w0 * ux
+            lx1 += w1 * ux
+            lx2 += w2 * ux
+            ly0 += w0 * uy
+            ly1 += w1 * uy
+            ly2 += w2 * uy
+            fastest = max(fastest, vx * vx + vy * vy, ux * ux + uy * uy)
+            p = max(row[P], 0.0)
+            r = v * (p - (n0 * p0 + n1 * p1 + n2 * p2))
+            q0 += n0 * r
+            q1 += n1 * r
+            q2 += n2 * r
+            fxx += v * (row[SXX] - p)
+            fyy += v * (row[SYY] - p)
+            fxy += v * row[SXY]
+            fp += v * p
+            total += v
+        volume[e] = total
+        fastest = np.sqrt(fastest)
+        local = geometry[e, 7] / (wave_speed + fastest)
+        if local < limit:
+            limit = local
+            limit_speed = fastest
+        g0x, g0y = -g1x - g2x, -g1y - g2y
+        b = sums[i0]
+        b[B_MS] += ms0
+        b[B_ML] += ml0
+        b[B_MN] += mn0
+        b[B_D] += d0
+        b[B_Q] += q0
+        b[B_PSX] += sx0
+        b[B_PSY] += sy0
+        b[B_PLX] += lx0
+        b[B_PLY] += ly0
+        b[B_FX] -= g0x * fxx + g0y * fxy
+        b[B_FY] -= g0x * fxy + g0y * fyy
+        b[B_FLX] += g0x * fp
+        b[B_FLY] += g0y * fp
+        b = sums[i1]
+        b[B_MS] += ms1
+        b[B_ML] += ml1
+        b[B_MN] += mn1
+        b[B_D] += d1
+        b[B_Q] += q1
+        b[B_PSX] += sx1
+        b[B_PSY] += sy1
+        b[B_PLX] += lx1
+        b[B_PLY] += ly1
+        b[B_FX] -= g1x * fxx + g1y * fxy
+        b[B_FY] -= g1x * fxy + g1y * fyy
+        b[B_FLX] += g1x * fp
+        b[B_FLY] += g1y * fp
+        b = sums[i2]
+        b[B_MS] += ms2
+        b[B_ML] += ml2
+        b[B_MN] += mn2
+        b[B_D] += d2
+        b[B_Q] += q2
+        b[B_PSX] += sx2
+        b[B_PSY] += sy2
+        b[B_PLX] += lx2
+        b[B_PLY] += ly2
+        b[B_FX] -= g2x * fxx + g2y * fxy
+        b[B_FY] -= g2x * fxy + g2y * fyy
+        b[B_FLX] += g2x * fp
+        b[B_FLY] += g2y * fp
     clamps[C_SUSPENDED] += n_suspended
     clamps[C_CAVITATED] += n_cavitated
     clamps[C_FLOOR] += n_floor
     clamps[C_CEILING] += n_ceiling
     clamps[C_TENSION] += n_tension
-    return moved, bad, n_suspended
+    return moved, bad, n_suspended, limit, limit_speed
+
+
+@kernel
+def map_point(row, soil, density_liquid, corner, geometry, nodes, sums):
+    """Add one point to the nodes of the element that holds it, as `update_points` does for those that stay.
+
+    row, soil, corner, geometry : one row of points, soils, elements and geometry.
+    Returns the volume of the point [m2] and its larger squared speed [m2/s2].
+    """
+    dx = row[X] - geometry[4]
+    dy = row[Y] - geometry[5]
+    n1 = geometry[0] * dx + geometry[1] * dy
+    n2 = geometry[2] * dx + geometry[3] * dy
+    m, n = row[MASS], row[N]
+    v = m / (soil[S_RHO_S] * (1.0 - n))
+    p = max(row[P], 0.0)
+    projected = (1.0 - n1 - n2) * nodes[corner[0], V_P] + n1 * nodes[corner[1], V_P] + n2 * nodes[corner[2], V_P]
+    fxx, fyy, fxy = v * (row[SXX] - p), v * (row[SYY] - p), v * row[SXY]
+    for k in range(3):
+        if k == 0:
+            weight, gx, gy = 1.0 - n1 - n2, -geometry[0] - geometry[2], -geometry[1] - geometry[3]
+        elif k == 1:
+            weight, gx, gy = n1, geometry[0], geometry[1]
+        else:
+            weight, gx, gy = n2, geometry[2], geometry[3]
+        b = sums[corner[k]]
+        w = weight * v * density_liquid
+        b[B_MS] += weight * m
+        b[B_ML] += w
+        b[B_MN] += n * w
+        b[B_D] += n * soil[S_DRAG] * w
+        b[B_Q] += weight * v * (p - projected)
+        b[B_PSX] += weight * m * row[VSX]
+        b[B_PSY] += weight * m * row[VSY]
+        b[B_PLX] += w * row[VLX]
+        b[B_PLY] += w * row[VLY]
+        b[B_FX] -= gx * fxx + gy * fxy
+        b[B_FY] -= gx * fxy + gy * fyy
+        b[B_FLX] += gx * v * p
+        b[B_FLY] += gy * v * p
+    return v, max(row[VSX] ** 2 + row[VSY] ** 2, row[VLX] ** 2 + row[VLY] ** 2)

@@ -182,6 +182,8 @@ def test_ctrl_c_in_a_real_run_leaves_a_readable_file(tmp_path):
         [sys.executable, "-m", "coupling.cli", "run", "quick", "--out", str(tmp_path / "a"), "--no-figures"],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
+        # a job in the background, as CI may be, hands down an ignored SIGINT
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
     deadline = time.monotonic() + 120  # compilation on a busy machine
     while not _has_records(tmp_path / "a") and process.poll() is None and time.monotonic() < deadline:
