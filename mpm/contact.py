@@ -28,6 +28,8 @@ from mpm.variables import (
     V_DLY,
     V_DSX,
     V_DSY,
+    V_GX,
+    V_GY,
     V_LX,
     V_LY,
     V_ML,
@@ -209,13 +211,20 @@ def remap_nodes(first, last, momenta, fixed, contact_of_node, normal, active, no
 
 @kernel
 def smooth_rates(first, last, sums, nodes):
-    """Nodal means of both divergences, weighted by material volume (Detournay & Dzik 2006)."""
+    """Nodal means of both divergences and of the gradient of the projected pressure, weighted by material volume.
+
+    Source: Detournay & Dzik (2006).
+    """
     for i in range(first, last):
-        weight = ts = tl = 0.0
+        weight = ts = tl = gx = gy = 0.0
         for part in range(sums.shape[0]):
             weight += sums[part, i, 0]
             ts += sums[part, i, 1]
             tl += sums[part, i, 2]
+            gx += sums[part, i, 3]
+            gy += sums[part, i, 4]
         if weight > 0.0:
             nodes[i, V_TS] = ts / weight
             nodes[i, V_TL] = tl / weight
+            nodes[i, V_GX] = gx / weight
+            nodes[i, V_GY] = gy / weight

@@ -18,6 +18,7 @@ from mpm.variables import (
     MASS,
     MODEL_ELASTIC,
     MODEL_MOHR_COULOMB,
+    NODAL_MEANS,
     NODE_WIDTH,
     POINT_VARIABLES,
     RATE_WIDTH,
@@ -74,7 +75,7 @@ class Solver:
         self.occupied = np.zeros(m, np.int32)
         self.sums = np.zeros((PARTS, n, BUFFER_WIDTH))
         self.momenta = np.zeros((PARTS, n, 4))
-        self.divergences = np.zeros((PARTS, n, 3))
+        self.nodal_means = np.zeros((PARTS, n, NODAL_MEANS))
         self.nodes = np.zeros((n, NODE_WIDTH))
         self.status = np.zeros(n, np.int8)
         self.rates = np.zeros((m, RATE_WIDTH))
@@ -264,8 +265,18 @@ class Solver:
 
     # -- stages ---------------------------------------------------------------------------------
 
+    def _element_rates(self):
+        self.over_elements(
+            element_rates, self.occupied, self.mesh.elements, self.geometry, self.nodes, self.volume, self.rates,
+            per_range=(self.nodal_means,),
+        )  # fmt: skip
+        self.over_nodes(smooth_rates, self.nodal_means, self.nodes)
+
     def map_points(self):
         """Sum the points at the nodes without advancing anything; sets the limits of the time step."""
+        inside = self.element_of_point >= 0
+        self.volume[:] = np.bincount(self.element_of_point[inside], self._volumes()[inside], len(self.volume))
+        self._element_rates()
         self._limits = [o[3:] for o in self._update_points(0.0, False)]
         self._mapped = True
 
@@ -320,9 +331,7 @@ class Solver:
             per_range=(self.momenta,),
         )  # fmt: skip
         self.over_nodes(remap_nodes, self.momenta, *wall, self.nodes, self.status)
-        self.over_elements(element_rates, self.occupied, *grid, self.volume, self.rates, per_range=(self.divergences,))
-        if numerics.volumetric_smoothing:
-            self.over_nodes(smooth_rates, self.divergences, self.nodes)
+        self._element_rates()
         outcome = self._update_points(dt, True)
         self._check(outcome)
         self._limits = [o[3:] for o in outcome]

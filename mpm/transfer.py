@@ -59,6 +59,8 @@ from mpm.variables import (
     V_DLY,
     V_DSX,
     V_DSY,
+    V_GX,
+    V_GY,
     V_LX,
     V_LY,
     V_P,
@@ -75,6 +77,10 @@ from mpm.variables import (
     X,
     Y,
 )
+
+
+# Share of the squared altitude: the shortest wave of the mesh loses most of its amplitude in a step, none overshoots.
+PROJECTION_SMOOTHING = 0.1
 
 
 @kernel
@@ -158,8 +164,8 @@ def advance_points(
 def element_rates(first, last, occupied, elements, geometry, nodes, volume, rates, sums):
     """Strain rates, spin and divergences of the remapped velocities, constant in an element [1/s].
 
-    `sums` (n_nodes, 3) receives material volume and volume times both divergences, for their nodal
-    means (Detournay & Dzik 2006).
+    `sums` (n_nodes, 5) receives material volume, volume times both divergences, for their nodal
+    means (Detournay & Dzik 2006), and volume times the gradient of the projected pore pressure.
     """
     sums[:] = 0.0
     for k in range(first, last):
@@ -182,11 +188,15 @@ def element_rates(first, last, occupied, elements, geometry, nodes, volume, rate
             + g1y * (b[V_LY] - a[V_LY]) + g2y * (c[V_LY] - a[V_LY])
         )  # fmt: skip
         v = volume[e]
+        p1, p2 = b[V_P] - a[V_P], c[V_P] - a[V_P]
+        px, py = v * (g1x * p1 + g2x * p2), v * (g1y * p1 + g2y * p2)
         for corner in range(3):
             d = sums[elements[e, corner]]
             d[0] += v
             d[1] += v * r[R_DS]
             d[2] += v * r[R_DL]
+            d[3] += px
+            d[4] += py
 
 
 @kernel
@@ -239,6 +249,9 @@ def update_points(
         ms0 = ms1 = ms2 = ml0 = ml1 = ml2 = mn0 = mn1 = mn2 = d0 = d1 = d2 = q0 = q1 = q2 = 0.0
         sx0 = sx1 = sx2 = sy0 = sy1 = sy2 = lx0 = lx1 = lx2 = ly0 = ly1 = ly2 = 0.0
         fxx = fxy = fyy = fp = total = fastest = 0.0
+        # gradient of the projected pressure, less its nodal mean: zero for a linear pressure
+        px = g1x * (p1 - p0) + g2x * (p2 - p0) - third * (nodes[i0, V_GX] + nodes[i1, V_GX] + nodes[i2, V_GX])
+        py = g1y * (p1 - p0) + g2y * (p2 - p0) - third * (nodes[i0, V_GY] + nodes[i1, V_GY] + nodes[i2, V_GY])
         if smoothing:
             ts = third * (nodes[i0, V_TS] + nodes[i1, V_TS] + nodes[i2, V_TS])
             tl = third * (nodes[i0, V_TL] + nodes[i1, V_TL] + nodes[i2, V_TL])
@@ -363,6 +376,11 @@ def update_points(
             limit = local
             limit_speed = fastest
         g0x, g0y = -g1x - g2x, -g1y - g2y
+        # weighted by the smallest of the element's nodal shares of volume: a node that hardly touches it is not overdrawn
+        damped = PROJECTION_SMOOTHING * geometry[e, 7] ** 2 * 3.0 * min(ml0, ml1, ml2) / density_liquid
+        q1 -= damped * (g1x * px + g1y * py)
+        q2 -= damped * (g2x * px + g2y * py)
+        q0 -= damped * (g0x * px + g0y * py)
         b = sums[i0]
         b[B_MS] += ms0
         b[B_ML] += ml0
