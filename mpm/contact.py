@@ -37,8 +37,9 @@ from mpm.variables import (
     V_P,
     V_SX,
     V_SY,
-    V_TL,
     V_TS,
+    V_WL,
+    V_WS,
 )
 
 FIXED_X, FIXED_Y = 1, 2
@@ -211,20 +212,25 @@ def remap_nodes(first, last, momenta, fixed, contact_of_node, normal, active, no
 
 @kernel
 def smooth_rates(first, last, sums, nodes):
-    """Nodal means of both divergences and of the gradient of the projected pressure, weighted by material volume.
+    """Nodal means of the divergences and of the gradient of the projected pressure (Detournay & Dzik 2006).
 
-    Source: Detournay & Dzik (2006).
+    sums : (n_parts, n_nodes, 7) float64, of `element_rates`. A node without weight keeps what it had.
     """
     for i in range(first, last):
-        weight = ts = tl = gx = gy = 0.0
+        volume = ts = wet = ws = wl = gx = gy = 0.0
         for part in range(sums.shape[0]):
-            weight += sums[part, i, 0]
-            ts += sums[part, i, 1]
-            tl += sums[part, i, 2]
-            gx += sums[part, i, 3]
-            gy += sums[part, i, 4]
-        if weight > 0.0:
-            nodes[i, V_TS] = ts / weight
-            nodes[i, V_TL] = tl / weight
-            nodes[i, V_GX] = gx / weight
-            nodes[i, V_GY] = gy / weight
+            row = sums[part, i]
+            volume += row[0]
+            ts += row[1]
+            wet += row[2]
+            ws += row[3]
+            wl += row[4]
+            gx += row[5]
+            gy += row[6]
+        if volume > 0.0:
+            nodes[i, V_TS] = ts / volume
+        if wet > 0.0:
+            nodes[i, V_WS] = ws / wet
+            nodes[i, V_WL] = wl / wet
+            nodes[i, V_GX] = gx / wet
+            nodes[i, V_GY] = gy / wet

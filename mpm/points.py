@@ -314,7 +314,9 @@ def relocate(
             added, fastest = map_point(
                 points[i], soils[soil_of_point[i]], density_liquid, elements[e], geometry[e], nodes, sums
             )
-            volume[e] += added
+            volume[e, 0] += added
+            if points[i, P] > 0.0:
+                volume[e, 1] += added
             fastest = np.sqrt(fastest)
             local = geometry[e, 7] / (wave_speed + fastest)
             if local < limit:

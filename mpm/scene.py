@@ -179,11 +179,24 @@ class Discretisation(Part):
 
 
 class Numerics(Part):
-    """Numerical choices, none of which should decide the answer; `pressure_filter` 0 turns the filter off."""
+    """Numerical choices, none of which should decide the answer.
+
+    Parameters
+    ----------
+    courant : float
+        Time step over the critical one [-].
+    pic_rate : float
+        Rate at which point velocities are drawn to those of the grid [1/s]; 0 is pure FLIP. A share per
+        second, not per step: the viscosity that it adds falls with the square of the mesh size.
+    pressure_filter : float
+        Share of a point's pore pressure that is drawn in each step to a smooth projection [-]; 0 is off.
+    volumetric_smoothing : bool
+        Mean volumetric strain rates over the elements around a node.
+    """
 
     courant: float = Field(default=0.5, gt=0, le=1)
-    flip_fraction: float = Field(default=0.99, ge=0, le=1)
-    pressure_filter: float = Field(default=0.05, ge=0, le=1)
+    pic_rate: Annotated[float, in_unit("1/s")] = Field(default=10.0, ge=0)
+    pressure_filter: float = Field(default=0.2, ge=0, le=1)
     volumetric_smoothing: bool = True
     relaxation_tolerance: float = Field(default=1e-5, gt=0, lt=1)
     max_relaxation_steps: int = Field(default=20000, ge=1)

@@ -29,6 +29,7 @@ from mpm.variables import (
     X0,
     Y0,
     N,
+    P,
     X,
     Y,
 )
@@ -79,7 +80,7 @@ class Solver:
         self.nodes = np.zeros((n, NODE_WIDTH))
         self.status = np.zeros(n, np.int8)
         self.rates = np.zeros((m, RATE_WIDTH))
-        self.volume = np.zeros(m)
+        self.volume = np.zeros((m, 2))
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
         self.threads = 1 if m < SMALLEST_PARALLEL else max(1, min(threads or cores, PARTS))
         self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
@@ -275,7 +276,9 @@ class Solver:
     def map_points(self):
         """Sum the points at the nodes without advancing anything; sets the limits of the time step."""
         inside = self.element_of_point >= 0
-        self.volume[:] = np.bincount(self.element_of_point[inside], self._volumes()[inside], len(self.volume))
+        element, volume = self.element_of_point[inside], self._volumes()[inside]
+        self.volume[:, 0] = np.bincount(element, volume, len(self.volume))
+        self.volume[:, 1] = np.bincount(element, volume * (self.points[inside, P] > 0), len(self.volume))
         self._element_rates()
         self._limits = [o[3:] for o in self._update_points(0.0, False)]
         self._mapped = True
@@ -327,8 +330,8 @@ class Solver:
             self.status, self.impulse,
         )  # fmt: skip
         self.over_elements(
-            advance_points, *layout, water.density, *grid, dt, numerics.flip_fraction, numerics.pressure_filter,
-            per_range=(self.momenta,),
+            advance_points, *layout, water.density, *grid, dt, math.exp(-numerics.pic_rate * dt),
+            numerics.pressure_filter, per_range=(self.momenta,),
         )  # fmt: skip
         self.over_nodes(remap_nodes, self.momenta, *wall, self.nodes, self.status)
         self._element_rates()

@@ -66,8 +66,9 @@ from mpm.variables import (
     V_P,
     V_SX,
     V_SY,
-    V_TL,
     V_TS,
+    V_WL,
+    V_WS,
     VLX,
     VLY,
     VSX,
@@ -77,7 +78,6 @@ from mpm.variables import (
     X,
     Y,
 )
-
 
 # Share of the squared altitude: the shortest wave of the mesh loses most of its amplitude in a step, none overshoots.
 PROJECTION_SMOOTHING = 0.1
@@ -164,8 +164,10 @@ def advance_points(
 def element_rates(first, last, occupied, elements, geometry, nodes, volume, rates, sums):
     """Strain rates, spin and divergences of the remapped velocities, constant in an element [1/s].
 
-    `sums` (n_nodes, 5) receives material volume, volume times both divergences, for their nodal
-    means (Detournay & Dzik 2006), and volume times the gradient of the projected pore pressure.
+    volume : (n_elements, 2) float64, of `update_points`.
+    sums : (n_nodes, 7) float64
+        Written: volume and volume times the divergence of the grains; volume under pore pressure, and
+        this times both divergences and times the gradient of the projected pore pressure.
     """
     sums[:] = 0.0
     for k in range(first, last):
@@ -187,16 +189,18 @@ def element_rates(first, last, occupied, elements, geometry, nodes, volume, rate
             g1x * (b[V_LX] - a[V_LX]) + g2x * (c[V_LX] - a[V_LX])
             + g1y * (b[V_LY] - a[V_LY]) + g2y * (c[V_LY] - a[V_LY])
         )  # fmt: skip
-        v = volume[e]
+        v, wet = volume[e, 0], volume[e, 1]
         p1, p2 = b[V_P] - a[V_P], c[V_P] - a[V_P]
-        px, py = v * (g1x * p1 + g2x * p2), v * (g1y * p1 + g2y * p2)
+        px, py = wet * (g1x * p1 + g2x * p2), wet * (g1y * p1 + g2y * p2)
         for corner in range(3):
             d = sums[elements[e, corner]]
             d[0] += v
             d[1] += v * r[R_DS]
-            d[2] += v * r[R_DL]
-            d[3] += px
-            d[4] += py
+            d[2] += wet
+            d[3] += wet * r[R_DS]
+            d[4] += wet * r[R_DL]
+            d[5] += px
+            d[6] += py
 
 
 @kernel
@@ -217,8 +221,11 @@ def update_points(
 
     Parameters
     ----------
-    rates, volume : (n_elements, 6), (n_elements,) float64
-        Strain rates [1/s]; material volume [m2], read of the last and written for the next step.
+    rates : (n_elements, 6) float64
+        Strain rates [1/s].
+    volume : (n_elements, 2) float64
+        Material volume, and that of points under pore pressure [m2]; read of the last and written for the
+        next step.
     element_of_point : (n_points,) int32
         Written: -2 - element for a point that left its element.
     sums : (n_nodes, 13) float64
@@ -248,26 +255,26 @@ def update_points(
         p0, p1, p2 = nodes[i0, V_P], nodes[i1, V_P], nodes[i2, V_P]
         ms0 = ms1 = ms2 = ml0 = ml1 = ml2 = mn0 = mn1 = mn2 = d0 = d1 = d2 = q0 = q1 = q2 = 0.0
         sx0 = sx1 = sx2 = sy0 = sy1 = sy2 = lx0 = lx1 = lx2 = ly0 = ly1 = ly2 = 0.0
-        fxx = fxy = fyy = fp = total = fastest = 0.0
+        fxx = fxy = fyy = fp = total = wet = fastest = 0.0
         # gradient of the projected pressure, less its nodal mean: zero for a linear pressure
         px = g1x * (p1 - p0) + g2x * (p2 - p0) - third * (nodes[i0, V_GX] + nodes[i1, V_GX] + nodes[i2, V_GX])
         py = g1y * (p1 - p0) + g2y * (p2 - p0) - third * (nodes[i0, V_GY] + nodes[i1, V_GY] + nodes[i2, V_GY])
+        own_s, own_l = dt * r[R_DS], dt * r[R_DL]
+        ts, wet_s, wet_l = r[R_DS], own_s, own_l
         if smoothing:
             ts = third * (nodes[i0, V_TS] + nodes[i1, V_TS] + nodes[i2, V_TS])
-            tl = third * (nodes[i0, V_TL] + nodes[i1, V_TL] + nodes[i2, V_TL])
-        else:
-            ts, tl = r[R_DS], r[R_DL]
+            if volume[e, 1] > 0.0:
+                wet_s = dt * third * (nodes[i0, V_WS] + nodes[i1, V_WS] + nodes[i2, V_WS])
+                wet_l = dt * third * (nodes[i0, V_WL] + nodes[i1, V_WL] + nodes[i2, V_WL])
         correction = 0.5 * (ts - r[R_DS])
         exx = dt * (r[R_XX] + correction)
         eyy = dt * (r[R_YY] + correction)
         exy = dt * r[R_XY]
         spin = dt * r[R_W]
         ts *= dt
-        tl *= dt
         mean = ts * third
         equivalent = np.sqrt(2.0 * third * ((exx - mean) ** 2 + (eyy - mean) ** 2 + mean * mean + 2.0 * exy * exy))
-        shrink = 1.0 / (1.0 + ts)
-        full = volume[e] >= geometry[e, 6]
+        full = volume[e, 0] >= geometry[e, 6]
         for j in range(start[e], start[e + 1]):
             i = order[j]
             row = points[i]
@@ -277,18 +284,23 @@ def update_points(
                 p = row[P]
                 loose = n >= s[S_LOOSE]
                 row[EQ] += equivalent
+                es, el = wet_s, wet_l
+                if p <= 0.0:
+                    # water that does not push constrains nothing, so nothing locks: the element's own rates,
+                    # which are what moves its points
+                    es, el = own_s, own_l
                 if loose and p <= 0.0 and not full:
                     # lumps with air between them: shape changes, neither grains nor water are squeezed
                     row[SXX] = row[SYY] = row[SZZ] = row[SXY] = 0.0
                     row[P] = 0.0
                     n_suspended += 1
                 else:
-                    p -= bulk_liquid / n * ((1.0 - n) * ts + n * tl)
+                    p -= bulk_liquid / n * ((1.0 - n) * es + n * el)
                     row[P] = p
                     if p < 0.0:
                         n_cavitated += 1
-                    if not (loose and p <= 0.0 and ts > 0.0):
-                        n = 1.0 - (1.0 - n) * shrink
+                    if not (loose and p <= 0.0 and es > 0.0):
+                        n = 1.0 - (1.0 - n) / (1.0 + es)
                         if n < POROSITY_FLOOR:
                             n = POROSITY_FLOOR
                             n_floor += 1
@@ -359,25 +371,30 @@ def update_points(
             ly1 += w1 * uy
             ly2 += w2 * uy
             fastest = max(fastest, vx * vx + vy * vy, ux * ux + uy * uy)
-            p = max(row[P], 0.0)
-            r = v * (p - (n0 * p0 + n1 * p1 + n2 * p2))
-            q0 += n0 * r
-            q1 += n1 * r
-            q2 += n2 * r
+            p = 0.0
+            if row[P] > 0.0:
+                p = row[P]
+                wet += v
+            excess = v * (p - (n0 * p0 + n1 * p1 + n2 * p2))
+            q0 += n0 * excess
+            q1 += n1 * excess
+            q2 += n2 * excess
             fxx += v * (row[SXX] - p)
             fyy += v * (row[SYY] - p)
             fxy += v * row[SXY]
             fp += v * p
             total += v
-        volume[e] = total
+        volume[e, 0] = total
+        volume[e, 1] = wet
         fastest = np.sqrt(fastest)
         local = geometry[e, 7] / (wave_speed + fastest)
         if local < limit:
             limit = local
             limit_speed = fastest
         g0x, g0y = -g1x - g2x, -g1y - g2y
-        # weighted by the smallest of the element's nodal shares of volume: a node that hardly touches it is not overdrawn
-        damped = PROJECTION_SMOOTHING * geometry[e, 7] ** 2 * 3.0 * min(ml0, ml1, ml2) / density_liquid
+        # the smallest of the element's nodal shares of volume: a node that hardly touches it is not overdrawn
+        share = 3.0 * min(ml0, ml1, ml2) / (density_liquid * total) if total > 0.0 else 0.0
+        damped = PROJECTION_SMOOTHING * geometry[e, 7] ** 2 * share * wet
         q1 -= damped * (g1x * px + g1y * py)
         q2 -= damped * (g2x * px + g2y * py)
         q0 -= damped * (g0x * px + g0y * py)
