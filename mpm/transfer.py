@@ -274,6 +274,7 @@ def update_points(
         ts *= dt
         mean = ts * third
         equivalent = np.sqrt(2.0 * third * ((exx - mean) ** 2 + (eyy - mean) ** 2 + mean * mean + 2.0 * exy * exy))
+        shrink = 1.0 / (1.0 + ts)
         full = volume[e, 0] >= geometry[e, 6]
         for j in range(start[e], start[e + 1]):
             i = order[j]
@@ -286,8 +287,8 @@ def update_points(
                 row[EQ] += equivalent
                 es, el = wet_s, wet_l
                 if p <= 0.0:
-                    # water that does not push constrains nothing, so nothing locks: the element's own rates,
-                    # which are what moves its points
+                    # missing water constrains nothing, so nothing locks: it is remembered by the element's own
+                    # rates, which are what moves its points
                     es, el = own_s, own_l
                 if loose and p <= 0.0 and not full:
                     # lumps with air between them: shape changes, neither grains nor water are squeezed
@@ -299,8 +300,8 @@ def update_points(
                     row[P] = p
                     if p < 0.0:
                         n_cavitated += 1
-                    if not (loose and p <= 0.0 and es > 0.0):
-                        n = 1.0 - (1.0 - n) / (1.0 + es)
+                    if not (loose and p <= 0.0 and ts > 0.0):
+                        n = 1.0 - (1.0 - n) * shrink
                         if n < POROSITY_FLOOR:
                             n = POROSITY_FLOOR
                             n_floor += 1

@@ -74,7 +74,8 @@ def test_dropped_block_lands_and_takes_up_the_area_its_grains_need():
     volume = np.bincount(element, solver.points_by_name()["volume"], len(area))
     solid = np.bincount(element, solver.points[:, MASS] / GRAIN_DENSITY, len(area))
     heap = filled(volume, area, solver.mesh.elements)
-    assert solid[heap].sum() > 0.95 * mass / GRAIN_DENSITY
+    # the rest lies in elements of the surface that are less than half full
+    assert solid[heap].sum() > 0.9 * mass / GRAIN_DENSITY
     # from as dense as it fell to just touching
     assert 0.9 * POROSITY < 1 - solid[heap].sum() / area[heap].sum() < 1.1 * LOOSE
 
