@@ -83,7 +83,7 @@ def measured(folder):
     _smoothness(row, folder, mesh)
     resting = postprocess.heap(read_points(folder, -1), mesh)
     met = bool(0.4 <= resting["porosity"] <= 0.6)
-    text = f"{resting['porosity']:.2f} over {resting['area']:.2f} m2; {resting['resting_share']:.0%} of the grains rest"
+    text = f"{resting['porosity']:.2f} over {resting['area']:.2f} m2; median speed {resting['speed']:.2f} m/s"
     row("heap_porosity", "porosity of the heap in the tunnel, by area", "0.4 .. 0.6", resting["porosity"], met, text)
     return rows, data
 
@@ -126,7 +126,7 @@ def forces(folder):
         cells = [f"{mass}"]
         for name in ("axial_force", "shear_force", "bending_moment"):
             for pick in ("max", "min"):
-                index = int(getattr(now[name], f"arg{pick}")())
+                index = int(getattr(now[name].values, f"arg{pick}")())
                 cells.append(f"{float(now[name][index]) / 1e3:.0f} ({float(now['theta'][index]):.0f})")
         cells.append(" ".join(f"{v * 1e3:.2f}" for v in now["joint_rotation"].values))
         lines.append("| " + " | ".join(cells) + " |")

@@ -156,14 +156,15 @@ def pore_pressure_steps(points, mesh, nearest, furthest):
 
 
 def heap(points, mesh):
-    """Material that has come to rest inside the gate's tunnel.
+    """Material that has landed inside the gate's tunnel.
 
     Returns
     -------
     dict
-        area: of the tunnel that slow material fills (:func:`filled`) [m2]; porosity: one minus the area of the grains
-        there over that area [-]; grain_mass: of all grains inside the tunnel [kg/m]; resting_share: of this mass, what
-        moves slower than 0.5 m/s; speed: mean of the resting material, by volume [m/s].
+        area: of the tunnel that material fills (:func:`filled`), the jet left out where it is thinner than an element
+        [m2]; porosity: one minus the area of the grains there over that area [-]; grain_mass: of all grains inside the
+        tunnel [kg/m]; resting_share: of this mass, what moves slower than 0.5 m/s [-]; speed: median by mass of all
+        grains inside [m/s].
     """
     tunnel = int(mesh.attrs["gate_tunnel"])
     x0, depth, radius = (
@@ -174,17 +175,20 @@ def heap(points, mesh):
     speed = np.hypot(points["velocity_solid_x"].values, points["velocity_solid_y"].values)
     mass, volume = points["grain_mass"].values, points["volume"].values
     element = element_of_points(points, mesh)
-    rows = inside & (element >= 0) & (speed < RESTING_SPEED)
+    rows = inside & (element >= 0)
     nodes, area = mesh["element_nodes"].values, _areas(mesh)
     dense = filled(np.bincount(element[rows], volume[rows], len(area)), area, nodes)
     solid = np.bincount(element[rows], (volume * (1 - points["porosity"].values))[rows], len(area))
-    total, resting = mass[inside].sum(), volume[rows].sum()
+    total = mass[rows].sum()
+    if not total:
+        return {"area": 0.0, "porosity": np.nan, "grain_mass": 0.0, "resting_share": np.nan, "speed": np.nan}
+    by_speed = np.argsort(speed[rows])
     return {
         "area": float(area[dense].sum()),
-        "porosity": float(1 - solid[dense].sum() / area[dense].sum()) if dense.any() else float("nan"),
+        "porosity": float(1 - solid[dense].sum() / area[dense].sum()) if dense.any() else np.nan,
         "grain_mass": float(total),
-        "resting_share": float(mass[rows].sum() / total) if total > 0 else float("nan"),
-        "speed": float((volume * speed)[rows].sum() / resting) if resting > 0 else float("nan"),
+        "resting_share": float(mass[rows & (speed < RESTING_SPEED)].sum() / total),
+        "speed": float(speed[rows][by_speed][np.searchsorted(np.cumsum(mass[rows][by_speed]), total / 2)]),
     }
 
 

@@ -274,7 +274,6 @@ def update_points(
         ts *= dt
         mean = ts * third
         equivalent = np.sqrt(2.0 * third * ((exx - mean) ** 2 + (eyy - mean) ** 2 + mean * mean + 2.0 * exy * exy))
-        shrink = 1.0 / (1.0 + ts)
         full = volume[e, 0] >= geometry[e, 6]
         for j in range(start[e], start[e + 1]):
             i = order[j]
@@ -300,8 +299,9 @@ def update_points(
                     row[P] = p
                     if p < 0.0:
                         n_cavitated += 1
-                    if not (loose and p <= 0.0 and ts > 0.0):
-                        n = 1.0 - (1.0 - n) * shrink
+                    change = es if loose else ts
+                    if not (loose and p <= 0.0 and change > 0.0):
+                        n = 1.0 - (1.0 - n) / (1.0 + change)
                         if n < POROSITY_FLOOR:
                             n = POROSITY_FLOOR
                             n_floor += 1
