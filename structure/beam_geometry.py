@@ -1,8 +1,7 @@
 """The ring as beam elements: nodes, constant stiffness of segments and joints, and how tractions become nodal forces.
 
-Unknowns at a node: radial w (outward), tangential v (clockwise), rotation b (clockwise). Nodes run clockwise from
-the first joint
-(or the crown); a joint has two nodes at one place, the last of one segment and the first of the next.
+Unknowns at a node: radial w (outward), tangential v (clockwise), rotation b (clockwise). Nodes run clockwise from the
+first joint (or the crown); a joint has two nodes at one place, the last of one segment and the first of the next.
 """
 
 from __future__ import annotations
@@ -95,9 +94,8 @@ def element_matrices(ring: Ring, mesh: RingMesh) -> tuple[np.ndarray, np.ndarray
     bending, axial = ring.bending_stiffness, ring.axial_stiffness
     phi = 12 * bending / (ring.shear_stiffness * length**2)
     n = len(half)
-    # Rows of `local`: displacement along the chord and outward from it, and rotation, at both ends. The radius at
-    # an end leans
-    # by half the element's angle from the normal of the chord.
+    # Rows of `local`: displacement along the chord and outward from it, and rotation, at both ends. The radius at an
+    # end leans by half the element's angle from the normal of the chord.
     local = np.zeros((n, 6, 6))
     for end, lean in ((0, -half), (3, half)):
         local[:, end, end], local[:, end, end + 1] = np.sin(lean), np.cos(lean)
@@ -160,9 +158,8 @@ def traction_operator(ring: Ring, mesh: RingMesh, theta: np.ndarray) -> tuple[sp
     Returns
     -------
     pressure, shear : (3 n_nodes, n_theta) sparse
-        Forces [N/m] and couples [N m/m] per Pa. Statically equivalent to the traction, linear between the samples:
-        the force on each piece
-        of the face goes to the two nodes of its element with the couple that moves it there.
+        Forces [N/m] and couples [N m/m] per Pa. Statically equivalent to the traction, linear between the samples: the
+        force on each piece of the face goes to the two nodes of its element with the couple that moves it there.
     """
     rows, columns, pressure_values, shear_values = [], [], [], []
     for place in GAUSS:

@@ -24,10 +24,9 @@ class BeamSpringLining(LiningModel):
 
     Notes
     -----
-    Forces are taken at the middle of every element, where the chord is parallel to the circle; so theta of the response
-    never falls on a joint. Soil springs start unstressed at the undeformed ring: the pressures given are what the
-    soil exerts there,
-    and the springs add what the ring's displacement mobilises.
+    Forces are taken at the middle of every element, where the chord is parallel to the circle; so theta of the
+    response never falls on a joint. Soil springs start unstressed at the undeformed ring: the pressures given are what
+    the soil exerts there, and the springs add what the ring's displacement mobilises.
     """
 
     def __init__(self, ring: Ring):
@@ -88,8 +87,7 @@ class BeamSpringLining(LiningModel):
         return np.hypot(nodal[..., 0], nodal[..., 1]).sum(-1)
 
     def _refuse_unbalanced(self, loads, times):
-        """Refuse what nothing carries: any resultant of a free ring, a torque where the soil does not resist
-        sliding."""
+        """Refuse what nothing carries: any resultant of a free ring, a torque where the soil does not resist it."""
         ground = self.ring.ground
         if self.ring.support == "invert" or (ground is not None and ground.tangential_springs):
             return

@@ -11,15 +11,14 @@ from structure.springs import soil_reaction, soil_springs
 
 #: Out-of-balance force at a node over the sum of all nodal loads at which Newton stops.
 RESIDUAL_TOLERANCE = 1e-11
-#: Roundings of the largest product in a row of the stiffness that an out-of-balance force cannot get below (18
-#: terms a row).
+#: Roundings of the largest product in a row of the stiffness, of 18 terms, that no out-of-balance force gets below.
 ROUNDINGS = 8
 MAX_ITERATIONS = 100
 #: Displacement over outer radius beyond which small displacements no longer describe the ring.
 LARGEST_DISPLACEMENT = 0.1
 #: Share of the initial spring stiffness kept in the *tangent* only (never in the reaction) of an open or yielded
-#: spring: it keeps a
-#: ring that has lost contact on one side factorisable, and slows convergence by no more than this factor an iteration.
+#: spring: it keeps a ring that has lost contact on one side factorisable, and slows convergence by no more than this
+#: factor an iteration.
 TANGENT_FLOOR = 1e-6
 #: A pivot this much below its diagonal is rounding: the structure is a mechanism. Sound rings stay above 1e-9.
 SMALLEST_PIVOT = 1e-13
@@ -72,8 +71,8 @@ class RingEquilibrium:
     def spring_forces(self, displacement: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
         """Nodal forces of the soil on the ring (n_nodes, 3); normal and tangential tangents times area [N/m2].
 
-        The area is that of the outer face. Slip there is the tangential displacement plus rotation times half the
-        thickness.
+        The area is that of the outer face; slip there is the tangential displacement plus half the thickness times
+        the rotation.
         """
         forces = np.zeros((len(self.area), 3))
         if self.springs is None:
@@ -119,8 +118,8 @@ class RingEquilibrium:
         """Displacements in equilibrium with nodal loads, from a first guess.
 
         Newton's method; where a full step overshoots (the work of the residual along it changes sign and does not
-        halve), the root of that
-        work along the step is found by bisection. The forces derive from a convex energy, so this cannot cycle.
+        halve), the root of that work along the step is found by bisection. The forces derive from a convex energy, so
+        this cannot cycle.
         """
         nodal = loads.reshape(-1, 3)
         scale = np.abs(nodal[:, :2]).sum() + np.abs(nodal[:, 2]).sum() / self.centre_radius

@@ -4,10 +4,9 @@ Signs, in one place:
 
 - Angles theta run clockwise from the crown; s is the arc length of the centre line in that direction.
 - Soil and water pressure push inward; soil shear positive drags the lining clockwise. All act on the outer face.
-- N compression positive; M positive with tension on the outer face; Q = -dM/ds - m, with m the clockwise couple per
-  arc that
-  shear on the outer face brings half a thickness from the centre line: Q positive where the part at larger s pushes
-  the part at smaller s inward.
+- N compression positive; M positive with tension on the outer face; Q = -dM/ds - m, with m the
+  clockwise couple per arc that shear on the outer face brings half a thickness from the centre line: Q positive where
+  the part at larger s pushes the part at smaller s inward.
 - Radial displacement outward, tangential displacement and rotation clockwise positive.
 - Joint opening positive for a gap; N = -k_n opening. Joint rotation positive when the joint opens on the outside;
   M = k_theta rotation. Joint dislocation positive when the clockwise segment steps inward; Q = k_s dislocation.
@@ -82,8 +81,7 @@ class LiningModel(ABC):
         ----------
         pressures : xarray.Dataset
             soil_pressure, water_pressure, soil_shear (time, theta) [Pa] on the outer face; theta [degree] in any
-            periodic
-            sampling, linear in between.
+            periodic sampling, linear in between.
 
         Returns
         -------

@@ -30,8 +30,7 @@ class Ground(BaseModel):
         Whether the soil resists sliding with a third of the normal stiffness.
     slip_at : {"outer_face", "centre_line"}
         Where the tangential springs take hold. "outer_face": where the soil is; a rotating section slips there too,
-        and the
-        reaction brings a couple. "centre_line": at the beam nodes, as load-structure programs usually do.
+        and the reaction brings a couple. "centre_line": at the beam nodes, as load-structure programs usually do.
     law : {"hyperbolic", "linear"}
         Reaction over displacement: Eq. (7), or its initial tangent without a limit.
     two_way : bool
@@ -78,10 +77,8 @@ class Ring(BaseModel):
         None: no soil springs; then loads and weight must balance, or `support` must carry the difference.
     balance_uplift : bool
         A lining held fixed while its pressures are taken carries their vertical resultant (buoyancy less weight).
-        True: that
-        resultant is balanced at every time by a radial soil pressure a cos(theta) on the outer face, as much more
-        at the
-        crown as less at the invert. False: soil springs (or the support) carry it.
+        True: that resultant is balanced at every time by a radial soil pressure a cos(theta) on the outer face, as
+        much more at the crown as less at the invert. False: soil springs (or the support) carry it.
     support : {"free", "invert"}
         "invert": the ring is clamped at the node next to its invert, as in a test stand. "free": only the ground
         holds it.
