@@ -131,12 +131,12 @@ def joint_matrices(ring: Ring) -> tuple[np.ndarray, np.ndarray]:
     return jumps, jumps.T @ np.diag([spring.normal, spring.shear, spring.rotation]) @ jumps
 
 
-def constant_stiffness(ring: Ring, mesh: RingMesh) -> sparse.csr_array:
-    """Stiffness of segments and joints, (3 n_nodes, 3 n_nodes)."""
+def constant_stiffness(ring: Ring, mesh: RingMesh, with_joints: bool = True) -> sparse.csr_array:
+    """Stiffness of the segments, and of linear joints unless left out, (3 n_nodes, 3 n_nodes)."""
     element_stiffness = element_matrices(ring, mesh)[1]
     unknowns = [mesh.element_unknowns()]
     blocks = [element_stiffness]
-    if len(mesh.joint_after):
+    if with_joints and len(mesh.joint_after):
         unknowns.append(mesh.joint_unknowns())
         blocks.append(np.broadcast_to(joint_matrices(ring)[1], (len(mesh.joint_after), 6, 6)))
     index = np.concatenate(unknowns)

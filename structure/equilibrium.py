@@ -1,11 +1,12 @@
-"""Equilibrium of a ring of beams in nonlinear soil springs: Newton's method with banded Cholesky factors."""
+"""Equilibrium of a ring of beams in nonlinear soil springs and joints: Newton's method with banded factors."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import lapack
 
-from structure.beam_geometry import RingMesh, constant_stiffness
+from structure.banded import BANDWIDTH, FoldedRing, Mechanism
+from structure.beam_geometry import RingMesh, constant_stiffness, joint_matrices
+from structure.joint_laws import JointForces, JointLaw
 from structure.ring import Ring
 from structure.springs import soil_reaction, soil_springs
 
@@ -20,14 +21,14 @@ LARGEST_DISPLACEMENT = 0.1
 #: spring: it keeps a ring that has lost contact on one side factorisable, and slows convergence by no more than this
 #: factor an iteration.
 TANGENT_FLOOR = 1e-6
-#: A pivot this much below its diagonal is rounding: the structure is a mechanism. Sound rings stay above 1e-9.
-SMALLEST_PIVOT = 1e-13
-#: Neighbours in the folded numbering are two nodes apart, with three unknowns each.
-BANDWIDTH = 8
+#: Smallest part of a load increment tried before a ring with nonlinear joints is given up.
+SMALLEST_INCREMENT = 1 / 256
+#: Smallest part of a Newton step tried.
+SMALLEST_SHARE = 2.0**-10
 
 
 class NoEquilibrium(ArithmeticError):
-    """Newton's method found no equilibrium; the message says what went wrong."""
+    """Newton's method found no equilibrium; the message says what went wrong and where."""
 
 
 class RingEquilibrium:
@@ -39,34 +40,30 @@ class RingEquilibrium:
     mesh : RingMesh
     held : (n_held,) int
         Unknowns held at zero.
+
+    Attributes
+    ----------
+    joints : JointLaw
+        Linear joints are part of the constant stiffness, others join in at every iteration.
     """
 
     def __init__(self, ring: Ring, mesh: RingMesh, held: np.ndarray):
+        self.ring, self.mesh = ring, mesh
         self.largest = LARGEST_DISPLACEMENT * ring.outer_radius
         on_face = ring.ground is not None and ring.ground.slip_at == "outer_face"
         self.lever = ring.thickness / 2 if on_face else 0.0
-        self.centre_radius = ring.centre_radius
         self.area = ring.outer_radius * mesh.node_span
         self.springs = soil_springs(ring) if ring.ground is not None else None
-        self.stiffness = constant_stiffness(ring, mesh)
-        self.magnitudes = abs(self.stiffness)
+        self.joints = JointLaw(ring)
+        self.jumps = joint_matrices(ring)[0]
+        self.joint_unknowns = mesh.joint_unknowns()
+        self.magnitudes = abs(constant_stiffness(ring, mesh))
+        self.stiffness = constant_stiffness(ring, mesh, with_joints=self.joints.linear)
         self.held = held
-        size = 3 * mesh.n_nodes
-        nodes = np.arange(mesh.n_nodes)
-        # Folding the ring flat puts both neighbours of a node within two places and closes the ring inside the band.
-        folded = np.where(2 * nodes < mesh.n_nodes, 2 * nodes, 2 * (mesh.n_nodes - nodes) - 1)
-        self.place = (3 * folded[:, None] + np.arange(3)).ravel()
-        self.band = self._constant_band(size)
-
-    def _constant_band(self, size: int) -> np.ndarray:
-        matrix = self.stiffness.tocoo()
-        free = ~np.isin(matrix.row, self.held) & ~np.isin(matrix.col, self.held)
-        row, column = self.place[matrix.row], self.place[matrix.col]
-        lower = free & (row >= column)
-        band = np.zeros((BANDWIDTH + 1, size), order="F")
-        np.add.at(band, (row[lower] - column[lower], column[lower]), matrix.data[lower])
-        band[0, self.place[self.held]] = self.stiffness.diagonal().max()
-        return band
+        self.folded = FoldedRing(mesh.n_nodes, held)
+        self.band = self.folded.lower_band(self.stiffness) if self.joints.linear else None
+        self.wide_band = None if self.joints.linear else self.folded.full_band(self.stiffness)
+        self.unslipped = np.zeros(len(ring.joint_angles))
 
     def spring_forces(self, displacement: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
         """Nodal forces of the soil on the ring (n_nodes, 3); normal and tangential tangents times area [N/m2].
@@ -90,65 +87,130 @@ class RingEquilibrium:
             self.area * np.maximum(slip_tangent, floor),
         )
 
-    def residual(self, displacement: np.ndarray, loads: np.ndarray):
+    def joint_forces(self, displacement: np.ndarray, slip: np.ndarray) -> JointForces:
+        """Forces in the joints at displacements (..., 3 n_nodes) reached from slips (..., n_joints)."""
+        return self.joints.forces(displacement[..., self.joint_unknowns] @ self.jumps.T, slip)
+
+    def internal_forces(self, displacement: np.ndarray, slip: np.ndarray) -> np.ndarray:
+        """Nodal forces that hold segments and joints deformed, (3 n_nodes,)."""
+        forces = self.stiffness @ displacement
+        if not self.joints.linear:
+            axial, shear, moment, *_ = self.joint_forces(displacement, slip)
+            np.add.at(forces, self.joint_unknowns, np.stack([-axial, shear, moment], axis=-1) @ self.jumps)
+        return forces
+
+    def residual(self, displacement: np.ndarray, loads: np.ndarray, slip: np.ndarray):
         """Out-of-balance nodal forces, zero where held, and the spring tangents."""
         spring, tangents = self.spring_forces(displacement)
-        out_of_balance = loads + spring.ravel() - self.stiffness @ displacement
+        out_of_balance = loads + spring.ravel() - self.internal_forces(displacement, slip)
         out_of_balance[self.held] = 0
         return out_of_balance, tangents
 
-    def _direction(self, out_of_balance: np.ndarray, tangents) -> np.ndarray:
-        band = self.band.copy(order="F")
-        normal, slip = tangents
-        radial, tangential, rotation = self.place.reshape(-1, 3).T
-        band[0, radial] += normal
-        band[0, tangential] += slip
-        band[1, tangential] += self.lever * slip
-        band[0, rotation] += self.lever**2 * slip
-        diagonal = band[0].copy()
-        factor, failed = lapack.dpbtrf(band, lower=1, overwrite_ab=1)
-        if failed or np.min(factor[0] ** 2 / diagonal) < SMALLEST_PIVOT:
-            raise NoEquilibrium("the ring is a mechanism: joints too weak to hold it without more ground")
-        right = np.empty_like(out_of_balance)
-        right[self.place] = out_of_balance
-        step, _ = lapack.dpbtrs(factor, right, lower=1)
-        return step[self.place]
+    def solver(self, displacement: np.ndarray, tangents, slip: np.ndarray):
+        """Function that turns out-of-balance forces into displacements with the tangent of this state."""
+        normal, slide = tangents
+        radial, tangential, rotation = self.folded.place.reshape(-1, 3).T
+        symmetric = self.joints.linear
+        band = (self.band if symmetric else self.wide_band).copy(order="F")
+        diagonal = 0 if symmetric else 2 * BANDWIDTH
+        band[diagonal, radial] += normal
+        band[diagonal, tangential] += slide
+        band[diagonal + 1, tangential] += self.lever * slide
+        band[diagonal, rotation] += self.lever**2 * slide
+        if symmetric:
+            return self.folded.cholesky(band)
+        band[diagonal - 1, rotation] += self.lever * slide
+        blocks = self.jumps.T @ self.joint_forces(displacement, slip).tangent @ self.jumps
+        place = self.folded.place[self.joint_unknowns]
+        row = np.repeat(place, 6, axis=1).reshape(-1, 6, 6)
+        column = np.tile(place, (1, 6)).reshape(-1, 6, 6)
+        blocks[np.isin(row, self.folded.place[self.held]) | np.isin(column, self.folded.place[self.held])] = 0
+        np.add.at(band, (diagonal + row - column, column), blocks)
+        return self.folded.lu(band)
 
-    def solve(self, loads: np.ndarray, start: np.ndarray) -> np.ndarray:
-        """Displacements in equilibrium with nodal loads, from a first guess.
+    def follow(
+        self, loads: np.ndarray, start: np.ndarray, slip: np.ndarray, loads_before: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Displacements in equilibrium with nodal loads, from the state before.
 
-        Newton's method; where a full step overshoots (the work of the residual along it changes sign and does not
-        halve), the root of that work along the step is found by bisection. The forces derive from a convex energy, so
-        this cannot cycle.
+        The increment is taken in one step; where nonlinear joints find no equilibrium so, in smaller ones, the slip
+        of each kept.
+
+        Parameters
+        ----------
+        loads, loads_before : (3 n_nodes,) float64
+            Now, and those in equilibrium with `start`.
+        start : (3 n_nodes,) float64
+        slip : (n_joints,) float64
+            Irreversible dislocations before [m].
+
+        Returns
+        -------
+        displacement : (3 n_nodes,) float64
+        slip : (n_joints,) float64
+            Slips from which the last increment started: with them :meth:`joint_forces` gives the forces.
         """
+        done, increment, displacement = 0.0, 1.0, start
+        while True:
+            target = min(1.0, done + increment)
+            part = loads if target == 1.0 else loads_before + target * (loads - loads_before)
+            try:
+                reached = self.solve(part, displacement, slip)
+            except NoEquilibrium:
+                increment /= 4
+                if self.joints.linear or increment < SMALLEST_INCREMENT:
+                    raise
+                continue
+            if target == 1.0:
+                return reached, slip
+            displacement, done = reached, target
+            slip = self.joint_forces(displacement, slip).slip
+
+    def solve(self, loads: np.ndarray, start: np.ndarray, slip: np.ndarray | None = None) -> np.ndarray:
+        """Displacements in equilibrium with nodal loads, by Newton's method from a first guess."""
+        slip = self.unslipped if slip is None else slip
         nodal = loads.reshape(-1, 3)
-        scale = np.abs(nodal[:, :2]).sum() + np.abs(nodal[:, 2]).sum() / self.centre_radius
+        scale = np.abs(nodal[:, :2]).sum() + np.abs(nodal[:, 2]).sum() / self.ring.centre_radius
         tolerance = RESIDUAL_TOLERANCE * scale
         displacement = start.copy()
-        out_of_balance, tangents = self.residual(displacement, loads)
+        out_of_balance, tangents = self.residual(displacement, loads, slip)
+        advance = self._advance_symmetric if self.joints.linear else self._advance
         for _ in range(MAX_ITERATIONS):
             rounding = ROUNDINGS * np.finfo(float).eps * (self.magnitudes @ np.abs(displacement)).max()
             if np.abs(out_of_balance).max() <= max(tolerance, rounding):
                 return displacement
-            step = self._direction(out_of_balance, tangents)
-            displacement, out_of_balance, tangents = self._advance(displacement, step, out_of_balance, loads)
+            try:
+                solver = self.solver(displacement, tangents, slip)
+            except Mechanism as mechanism:
+                raise NoEquilibrium(self._loose_place(mechanism.motion)) from mechanism
+            displacement, out_of_balance, tangents = advance(displacement, solver, out_of_balance, loads, slip)
             largest = np.abs(displacement.reshape(-1, 3)[:, :2]).max()
             if not largest <= self.largest:
+                worst = int(np.abs(displacement.reshape(-1, 3)[:, :2]).max(1).argmax())
                 raise NoEquilibrium(
-                    f"displacements reach {largest:.3g} m, beyond {self.largest:.3g} m (a tenth of the outer radius):"
-                    " the ground cannot carry the loads, or the joints are too weak"
+                    f"displacements reach {largest:.3g} m {self._place(worst)}, beyond {self.largest:.3g} m (a tenth of"
+                    " the outer radius): the ground cannot carry the loads, or the joints are too weak"
+                    + self._joint_states(displacement, slip)
                 )
+        worst = int(np.abs(out_of_balance).argmax()) // 3
         raise NoEquilibrium(
-            f"the largest out-of-balance force is still {np.abs(out_of_balance).max():.3g} N/m after {MAX_ITERATIONS}"
-            f" iterations (wanted {tolerance:.3g}): the loads are close to what the ground can carry"
+            f"the largest out-of-balance force is still {np.abs(out_of_balance).max():.3g} N/m {self._place(worst)}"
+            f" after {MAX_ITERATIONS} iterations (wanted {tolerance:.3g}): the loads are close to what the ground and"
+            " the joints can carry" + self._joint_states(displacement, slip)
         )
 
-    def _advance(self, displacement, step, out_of_balance, loads):
+    def _advance_symmetric(self, displacement, solver, out_of_balance, loads, slip):
+        """One Newton step; where it overshoots, the root of the residual's work along it is found by bisection.
+
+        Overshooting: the work changes sign and does not halve. The forces derive from a convex energy, so this cannot
+        cycle.
+        """
+        step = solver(out_of_balance)
         work = out_of_balance @ step
         low, high, share = 0.0, 1.0, 1.0
         for _ in range(30):
             moved = displacement + share * step
-            residual, tangents = self.residual(moved, loads)
+            residual, tangents = self.residual(moved, loads, slip)
             left = residual @ step
             if left >= -0.5 * work:
                 if share == 1.0 or left <= 0.5 * work:
@@ -158,3 +220,50 @@ class RingEquilibrium:
                 high = share
             share = (low + high) / 2
         return moved, residual, tangents
+
+    def _advance(self, displacement, solver, out_of_balance, loads, slip):
+        """One Newton step, halved until the step that the same tangent would take next is shorter.
+
+        This natural monotonicity test needs neither an energy, which sliding and gaping joints lack, nor weights
+        between forces and couples. Source: Deuflhard (2011), Newton Methods for Nonlinear Problems, section 3.3.
+        """
+        step = solver(out_of_balance)
+        length = self._length(step)
+        share = 1.0
+        while True:
+            moved = displacement + share * step
+            residual, tangents = self.residual(moved, loads, slip)
+            if share <= SMALLEST_SHARE or self._length(solver(residual)) <= (1 - share / 4) * length:
+                return moved, residual, tangents
+            share /= 2
+
+    def _length(self, step):
+        nodal = step.reshape(-1, 3)
+        return np.sqrt((nodal[:, :2] ** 2).sum() + (self.ring.centre_radius * nodal[:, 2]) ** 2 @ np.ones(len(nodal)))
+
+    def _place(self, node: int) -> str:
+        for joint, sides in enumerate(zip(self.mesh.joint_before, self.mesh.joint_after, strict=True)):
+            if node in sides:
+                return f"at joint {joint + 1} ({self.ring.joint_angles[joint]:g} degrees)"
+        return f"at {np.degrees(self.mesh.node_angle[node]) % 360:.4g} degrees"
+
+    def _loose_place(self, motion: np.ndarray) -> str:
+        message = "the ring is a mechanism: joints too weak to hold it without more ground"
+        if not len(self.joint_unknowns) or not np.isfinite(motion).all():
+            return message
+        jumps = np.abs(motion[self.joint_unknowns] @ self.jumps.T) * [1, 1, self.ring.centre_radius]
+        joint, way = np.unravel_index(int(jumps.argmax()), jumps.shape)
+        if jumps[joint, way] < 1e-3 * np.abs(motion).max():
+            return message + "; it moves as a whole"
+        verb = ("opens", "slides", "turns")[way]
+        return message + f"; joint {joint + 1} ({self.ring.joint_angles[joint]:g} degrees) {verb} most freely"
+
+    def _joint_states(self, displacement: np.ndarray, slip: np.ndarray) -> str:
+        """Which nonlinear joints are not closed, for the message of a failure."""
+        if self.joints.linear:
+            return ""
+        jumps = displacement[self.joint_unknowns] @ self.jumps.T
+        forces = self.joints.forces(jumps, slip)
+        states = [self.joints.state(jump, JointForces(*parts)) for jump, *parts in zip(jumps, *forces, strict=True)]
+        loose = [f"joint {k + 1} is {state}" for k, state in enumerate(states) if state != "closed"]
+        return f"; {', '.join(loose)}" if loose else "; all joints are closed"
