@@ -10,6 +10,7 @@ _HOMES = {
     "Ground": "structure.ring",
     "LiningModel": "structure.lining",
     "LiningFailure": "structure.lining",
+    "additional": "structure.lining",
     "BeamSpringLining": "structure.beam_spring",
     "theoretical_pressures": "structure.theory",
 }

@@ -1,0 +1,31 @@
+"""A lining model of your own is one class: the homogeneous ring of equivalent stiffness (JSCE)."""
+
+from pydantic import Field
+
+from structure import BeamSpringLining, LiningModel, Ring, theory
+
+
+class SoftenedRing(Ring):
+    """A ring that bends with eta EI: the efficiency factor of its joints, from tests or a code."""
+
+    efficiency: float = Field(gt=0, le=1)
+    bending_stiffness = property(lambda self: self.efficiency * Ring.bending_stiffness.fget(self))
+
+
+class EquivalentStiffnessLining(LiningModel):
+    """No joints; staggered segments take M (1 + zeta), and M (1 - zeta) is left for the joints between them."""
+
+    def __init__(self, ring, efficiency, moment_increase=0.0):
+        unjointed = ring.model_dump() | {"joint_angles": (), "efficiency": efficiency}
+        self.homogeneous, self.moment_increase = BeamSpringLining(SoftenedRing(**unjointed)), moment_increase
+
+    def respond(self, pressures):
+        response = self.homogeneous.respond(pressures).assign_attrs(model="equivalent-stiffness")
+        response["bending_moment"] *= 1 + self.moment_increase
+        return response
+
+
+concrete = dict(concrete_modulus=34.5e9, concrete_poissons_ratio=0.2, concrete_unit_weight=25e3)
+ring = Ring(outer_diameter=6.6, inner_diameter=5.9, **concrete, balance_uplift=True)
+loads = theory.theoretical_pressures(outer_diameter=6.6, cover=20, buoyant_unit_weight=8.9e3, coefficient_at_rest=0.43)
+print(EquivalentStiffnessLining(ring, efficiency=0.7, moment_increase=0.3).respond(loads)["bending_moment"].max())
