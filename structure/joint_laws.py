@@ -13,8 +13,8 @@ import numpy as np
 
 from structure.ring import Ring
 
-#: Share of a joint's own stiffness kept in the *tangent* only of a joint that is open, sliding or nearly hinged, so
-#: that the ring stays factorisable; it slows convergence by no more than this factor an iteration.
+#: Share of the stiffness of joint or segment, whichever is less, kept in the *tangent* only of a joint that is open,
+#: sliding or nearly hinged: the ring stays factorisable, and convergence slows by no more than this factor a step.
 TANGENT_FLOOR = 1e-6
 
 
@@ -130,6 +130,8 @@ class JointLaw:
         self.normal = ring.joint_normal_stiffness
         self.shear = ring.joint_shear_stiffness
         self.rotation = ring.joint_rotational_stiffness
+        along, across = ring.axial_stiffness / ring.centre_radius, ring.bending_stiffness / ring.centre_radius
+        self.floors = TANGENT_FLOOR * np.minimum([self.normal, self.shear, self.rotation], [along, along, across])
         self.contact_only = ring.joint_contact_only
         self.height = ring.joint_contact_height
         self.friction = ring.joint_friction_coefficient
@@ -151,20 +153,20 @@ class JointLaw:
         tangent = np.zeros((*jumps.shape, 3))
         gap = opening > 0 if self.contact_only else np.zeros(opening.shape, dtype=bool)
         axial = np.where(gap, 0.0, -self.normal * opening)
-        tangent[..., 0, 0] = np.where(gap, TANGENT_FLOOR, 1.0) * self.normal
+        tangent[..., 0, 0] = np.where(gap, self.floors[0], self.normal)
         axial_by_opening = np.where(gap, 0.0, -self.normal)
         if self.friction is None:
             shear, by_dislocation = self.shear * dislocation, self.shear
         else:
             shear, by_dislocation, by_axial, slip = limited_shear(dislocation, slip, axial, self.shear, self.friction)
             tangent[..., 1, 0] = by_axial * axial_by_opening
-        tangent[..., 1, 1] = np.maximum(by_dislocation, TANGENT_FLOOR * self.shear)
+        tangent[..., 1, 1] = np.maximum(by_dislocation, self.floors[1])
         if self.height is None:
             moment, by_rotation = self.rotation * rotation, self.rotation
         else:
             moment, by_rotation, by_axial = contact_moment(rotation, axial, self.rotation, self.height)
             tangent[..., 2, 0] = by_axial * axial_by_opening
-        tangent[..., 2, 2] = np.maximum(by_rotation, TANGENT_FLOOR * self.rotation)
+        tangent[..., 2, 2] = np.maximum(by_rotation, self.floors[2])
         return JointForces(axial, shear, moment, tangent, slip)
 
     def state(self, jumps: np.ndarray, forces: JointForces) -> str:
