@@ -45,7 +45,8 @@ UNEQUAL = dict(steel_area_outer=3e-3, steel_area_inner=0.8e-3, bar_depth_inner=0
 def state(axis_depth):
     """Forces and strains of eps_cu2 at the inner face and a neutral axis this deep, by hand."""
     strain = {at: 0.0035 * (1 - at / axis_depth) for at in (DEPTH, THICKNESS - DEPTH, THICKNESS)}
-    pressed = 1.5e-3 * (min(MODULUS * strain[DEPTH], FYD) - FCD * (1 - (1 - min(strain[DEPTH] / 0.002, 1)) ** 2))
+    displaced = FCD * (1 - (1 - min(max(strain[DEPTH] / 0.002, 0), 1)) ** 2)
+    pressed = 1.5e-3 * (min(MODULUS * strain[DEPTH], FYD) - displaced)
     pulled = 1.5e-3 * max(MODULUS * strain[THICKNESS - DEPTH], -FYD)
     block = FULLNESS * FCD * axis_depth
     axial = block + pressed + pulled
