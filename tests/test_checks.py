@@ -54,7 +54,7 @@ def test_response_stays_as_it_was_and_every_addition_is_described(response, chec
 def test_utilisation_of_one_section_by_hand(response, place):
     checked = check(response, limits(segment=section(**UNEQUAL)))
     boundary = interaction(section(**UNEQUAL), 0.35)
-    at = int(getattr(response["bending_moment"][2], place)())
+    at = int(getattr(response["bending_moment"].values[2], place)())
     axial, moment = (response[name].values[2, at] for name in ("axial_force", "bending_moment"))
     assert np.sign(moment) == (1 if place == "argmax" else -1)
     design = np.sign(moment) * max(1.35 * abs(moment), 0.02 * axial)
