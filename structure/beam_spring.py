@@ -9,7 +9,7 @@ from structure.beam_geometry import RingMesh, element_matrices, joint_matrices, 
 from structure.equilibrium import NoEquilibrium, RingEquilibrium
 from structure.lining import LiningFailure, LiningModel, check_pressures, response_dataset
 from structure.ring import Ring
-from structure.springs import limit_pressures
+from structure.springs import joint_spring, limit_pressures
 
 #: Resultant over the sum of all nodal forces below which a ring without ground counts as balanced.
 BALANCE_TOLERANCE = 1e-6
@@ -143,14 +143,19 @@ class BeamSpringLining(LiningModel):
     def _joints(self, displacements, slips):
         unknowns = displacements[:, self.mesh.joint_unknowns()]
         opening, dislocation, rotation = np.einsum("ij,tkj->itk", self._joint_jumps, unknowns)
-        forces = self._equilibrium.joint_forces(displacements, slips)
+        if self._equilibrium.joints.linear:
+            spring = joint_spring(self.ring)
+            stiffness = np.array([-spring.normal, spring.shear, spring.rotation])
+            forces = np.einsum("i,ij,tkj->itk", stiffness, self._joint_jumps, unknowns)
+        else:
+            forces = self._equilibrium.joint_forces(displacements, slips)
         return {
             "joint_opening": opening,
             "joint_dislocation": dislocation,
             "joint_rotation": rotation,
-            "joint_axial_force": forces.axial,
-            "joint_shear_force": forces.shear,
-            "joint_bending_moment": forces.moment,
+            "joint_axial_force": forces[0],
+            "joint_shear_force": forces[1],
+            "joint_bending_moment": forces[2],
         }
 
     def _balances(self, displacements, slips, loads, springs):
