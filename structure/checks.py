@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import tomllib
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -119,7 +119,7 @@ def check(response: xr.Dataset, limits: Limits) -> xr.Dataset:
         raise ValueError("check: response must have the attribute 'ring' with the diameters, got none; take it as"
                          " respond() returned it")  # fmt: skip
     ring = json.loads(response.attrs["ring"])
-    variables = {}
+    variables: dict[str, Any] = {}
     if limits.segment is not None:
         variables |= _capacity_check(response, limits, (ring["outer_diameter"] - ring["inner_diameter"]) / 2)
     if limits.gasket_opening is not None or limits.joint_dislocation is not None:

@@ -64,8 +64,8 @@ class RingEquilibrium:
         self.stiffness = constant_stiffness(ring, mesh, with_joints=self.joints.linear)
         self.held = held
         self.folded = FoldedRing(mesh.n_nodes, held)
-        self.band = self.folded.lower_band(self.stiffness) if self.joints.linear else None
-        self.wide_band = None if self.joints.linear else self.folded.full_band(self.stiffness)
+        store = self.folded.lower_band if self.joints.linear else self.folded.full_band
+        self.band = store(self.stiffness)
         self.unslipped = np.zeros(len(ring.joint_angles))
         self.loose = self._mechanism() if ring.ground is None else ""
 
@@ -129,7 +129,7 @@ class RingEquilibrium:
         normal, slide = tangents
         radial, tangential, rotation = self.folded.place.reshape(-1, 3).T
         symmetric = self.joints.linear
-        band = (self.band if symmetric else self.wide_band).copy(order="F")
+        band = self.band.copy(order="F")
         diagonal = 0 if symmetric else 2 * BANDWIDTH
         band[diagonal, radial] += normal
         band[diagonal, tangential] += slide
@@ -285,6 +285,9 @@ class RingEquilibrium:
             return ""
         jumps = displacement[self.joint_unknowns] @ self.jumps.T
         forces = self.joints.forces(jumps, slip)
-        states = [self.joints.state(jump, JointForces(*parts)) for jump, *parts in zip(jumps, *forces, strict=True)]
-        loose = [f"joint {k + 1} is {state}" for k, state in enumerate(states) if state != "closed"]
+        loose = [
+            f"joint {k + 1} is {state}"
+            for k, state in enumerate(self.joints.states(jumps, forces))
+            if state != "closed"
+        ]
         return f"; {', '.join(loose)}" if loose else "; all joints are closed"

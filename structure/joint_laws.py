@@ -156,24 +156,25 @@ class JointLaw:
         tangent[..., 0, 0] = np.where(gap, self.floors[0], self.normal)
         axial_by_opening = np.where(gap, 0.0, -self.normal)
         if self.friction is None:
-            shear, by_dislocation = self.shear * dislocation, self.shear
+            shear, by_dislocation = self.shear * dislocation, np.asarray(self.shear)
         else:
             shear, by_dislocation, by_axial, slip = limited_shear(dislocation, slip, axial, self.shear, self.friction)
             tangent[..., 1, 0] = by_axial * axial_by_opening
         tangent[..., 1, 1] = np.maximum(by_dislocation, self.floors[1])
         if self.height is None:
-            moment, by_rotation = self.rotation * rotation, self.rotation
+            moment, by_rotation = self.rotation * rotation, np.asarray(self.rotation)
         else:
             moment, by_rotation, by_axial = contact_moment(rotation, axial, self.rotation, self.height)
             tangent[..., 2, 0] = by_axial * axial_by_opening
         tangent[..., 2, 2] = np.maximum(by_rotation, self.floors[2])
         return JointForces(axial, shear, moment, tangent, slip)
 
-    def state(self, jumps: np.ndarray, forces: JointForces) -> str:
-        """What one joint does, in words: jumps (3,), forces of that joint."""
-        words = ["open" if self.contact_only and jumps[0] > 0 else ""]
-        if self.height is not None and abs(forces.moment) > max(forces.axial, 0.0) * self.height / 6:
-            words.append("gaping at one edge")
-        if self.friction is not None and abs(forces.shear) >= self.friction * max(forces.axial, 0.0):
-            words.append("sliding")
-        return ", ".join(filter(None, words)) or "closed"
+    def states(self, jumps: np.ndarray, forces: JointForces) -> list[str]:
+        """What each joint does, in words, from its jumps (n_joints, 3) and forces."""
+        compression = np.maximum(forces.axial, 0.0)
+        happens = {"open": (jumps[:, 0] > 0) & self.contact_only}
+        if self.height is not None:
+            happens["gaping at one edge"] = np.abs(forces.moment) > compression * self.height / 6
+        if self.friction is not None:
+            happens["sliding"] = np.abs(forces.shear) >= compression * self.friction
+        return [", ".join(word for word in happens if happens[word][k]) or "closed" for k in range(len(jumps))]

@@ -180,10 +180,10 @@ def additional(response: xr.Dataset) -> xr.Dataset:
     changed = {}
     for name, variable in response.data_vars.items():
         if name == "inflow_mass":
-            changed[name] = variable
+            changed[str(name)] = variable
         elif "time" in variable.dims and name not in NOT_ADDITIONAL:
             difference = variable - variable.isel(time=0, drop=True)
-            changed[name] = difference.assign_attrs(
+            changed[str(name)] = difference.assign_attrs(
                 variable.attrs, long_name=f"additional {variable.attrs.get('long_name', name)}"
             )
     return xr.Dataset(changed, coords=response.coords, attrs=response.attrs)
