@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from structure.banded import BANDWIDTH, FoldedRing, Mechanism, softest_motion
-from structure.beam_geometry import RingMesh, constant_stiffness, joint_matrices
-from structure.joint_laws import JointForces, JointLaw
+from structure.banded import Mechanism, softest_motion
+from structure.beam_geometry import RingMesh
 from structure.ring import Ring
-from structure.springs import soil_reaction, soil_springs
+from structure.ring_forces import RingForces
 
 #: Out-of-balance force at a node over the sum of all nodal loads at which Newton stops.
 RESIDUAL_TOLERANCE = 1e-11
@@ -17,10 +16,6 @@ ROUNDINGS = 8
 MAX_ITERATIONS = 100
 #: Displacement over outer radius beyond which small displacements no longer describe the ring.
 LARGEST_DISPLACEMENT = 0.1
-#: Share of the initial spring stiffness kept in the *tangent* only (never in the reaction) of an open or yielded
-#: spring: it keeps a ring that has lost contact on one side factorisable, and slows convergence by no more than this
-#: factor an iteration.
-TANGENT_FLOOR = 1e-6
 #: Smallest eigenvalue of the tangent, scaled to a diagonal of one, of a ring that is held. Measured: mechanisms of 4 to
 #: 6 hinges and sliding joints below 1.1e-15 (rounding); sound rings of 100 to 2000 elements above 1.9e-14 (1 mm thick).
 SOFTEST = 2e-15
@@ -34,39 +29,12 @@ class NoEquilibrium(ArithmeticError):
     """Newton's method found no equilibrium; the message says what went wrong and where."""
 
 
-class RingEquilibrium:
-    """Finds displacements under nodal forces; unknowns as in :mod:`structure.beam_geometry`.
-
-    Parameters
-    ----------
-    ring : Ring
-    mesh : RingMesh
-    held : (n_held,) int
-        Unknowns held at zero.
-
-    Attributes
-    ----------
-    joints : JointLaw
-        Linear joints are part of the constant stiffness, others join in at every iteration.
-    """
+class RingEquilibrium(RingForces):
+    """Finds displacements under nodal forces, of a ring that may be held at some unknowns."""
 
     def __init__(self, ring: Ring, mesh: RingMesh, held: np.ndarray):
-        self.ring, self.mesh = ring, mesh
+        super().__init__(ring, mesh, held)
         self.largest = LARGEST_DISPLACEMENT * ring.outer_radius
-        on_face = ring.ground is not None and ring.ground.slip_at == "outer_face"
-        self.lever = ring.thickness / 2 if on_face else 0.0
-        self.area = ring.outer_radius * mesh.node_span
-        self.springs = soil_springs(ring) if ring.ground is not None else None
-        self.joints = JointLaw(ring)
-        self.jumps = joint_matrices(ring)[0]
-        self.joint_unknowns = mesh.joint_unknowns()
-        self.magnitudes = abs(constant_stiffness(ring, mesh))
-        self.stiffness = constant_stiffness(ring, mesh, with_joints=self.joints.linear)
-        self.held = held
-        self.folded = FoldedRing(mesh.n_nodes, held)
-        store = self.folded.lower_band if self.joints.linear else self.folded.full_band
-        self.band = store(self.stiffness)
-        self.unslipped = np.zeros(len(ring.joint_angles))
         self.loose = self._mechanism() if ring.ground is None else ""
 
     def _mechanism(self) -> str:
@@ -79,72 +47,9 @@ class RingEquilibrium:
         try:
             solver = self.solver(still, tangents, self.unslipped)
         except Mechanism as mechanism:
-            return self._loose_place(mechanism.motion)
+            return self.loose_place(mechanism.motion)
         softness, motion = softest_motion(solver, np.sqrt(self.magnitudes.diagonal()))
-        return self._loose_place(motion) if softness < SOFTEST else ""
-
-    def spring_forces(self, displacement: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
-        """Nodal forces of the soil on the ring (n_nodes, 3); normal and tangential tangents times area [N/m2].
-
-        The area is that of the outer face; slip there is the tangential displacement plus half the thickness times
-        the rotation.
-        """
-        forces = np.zeros((len(self.area), 3))
-        if self.springs is None:
-            return forces, (forces[:, 0], forces[:, 0])
-        nodal = displacement.reshape(-1, 3)
-        normal, tangential = self.springs
-        pressure, normal_tangent = soil_reaction(nodal[:, 0], normal)
-        friction, slip_tangent = soil_reaction(nodal[:, 1] + self.lever * nodal[:, 2], tangential)
-        forces[:, 0] = -self.area * pressure
-        forces[:, 1] = -self.area * friction
-        forces[:, 2] = self.lever * forces[:, 1]
-        floor = TANGENT_FLOOR * normal.stiffness
-        return forces, (
-            self.area * np.maximum(normal_tangent, floor),
-            self.area * np.maximum(slip_tangent, floor),
-        )
-
-    def joint_forces(self, displacement: np.ndarray, slip: np.ndarray) -> JointForces:
-        """Forces in the joints at displacements (..., 3 n_nodes) reached from slips (..., n_joints)."""
-        return self.joints.forces(displacement[..., self.joint_unknowns] @ self.jumps.T, slip)
-
-    def internal_forces(self, displacement: np.ndarray, slip: np.ndarray) -> np.ndarray:
-        """Nodal forces that hold segments and joints deformed, (3 n_nodes,)."""
-        forces = self.stiffness @ displacement
-        if not self.joints.linear:
-            axial, shear, moment, *_ = self.joint_forces(displacement, slip)
-            np.add.at(forces, self.joint_unknowns, np.stack([-axial, shear, moment], axis=-1) @ self.jumps)
-        return forces
-
-    def residual(self, displacement: np.ndarray, loads: np.ndarray, slip: np.ndarray):
-        """Out-of-balance nodal forces, zero where held, and the spring tangents."""
-        spring, tangents = self.spring_forces(displacement)
-        out_of_balance = loads + spring.ravel() - self.internal_forces(displacement, slip)
-        out_of_balance[self.held] = 0
-        return out_of_balance, tangents
-
-    def solver(self, displacement: np.ndarray, tangents, slip: np.ndarray):
-        """Function that turns out-of-balance forces into displacements with the tangent of this state."""
-        normal, slide = tangents
-        radial, tangential, rotation = self.folded.place.reshape(-1, 3).T
-        symmetric = self.joints.linear
-        band = self.band.copy(order="F")
-        diagonal = 0 if symmetric else 2 * BANDWIDTH
-        band[diagonal, radial] += normal
-        band[diagonal, tangential] += slide
-        band[diagonal + 1, tangential] += self.lever * slide
-        band[diagonal, rotation] += self.lever**2 * slide
-        if symmetric:
-            return self.folded.cholesky(band)
-        band[diagonal - 1, rotation] += self.lever * slide
-        blocks = self.jumps.T @ self.joint_forces(displacement, slip).tangent @ self.jumps
-        place = self.folded.place[self.joint_unknowns]
-        row = np.repeat(place, 6, axis=1).reshape(-1, 6, 6)
-        column = np.tile(place, (1, 6)).reshape(-1, 6, 6)
-        blocks[np.isin(row, self.folded.place[self.held]) | np.isin(column, self.folded.place[self.held])] = 0
-        np.add.at(band, (diagonal + row - column, column), blocks)
-        return self.folded.lu(band)
+        return self.loose_place(motion) if softness < SOFTEST else ""
 
     def follow(
         self, loads: np.ndarray, start: np.ndarray, slip: np.ndarray, loads_before: np.ndarray
@@ -202,21 +107,21 @@ class RingEquilibrium:
             try:
                 solver = self.solver(displacement, tangents, slip)
             except Mechanism as mechanism:
-                raise NoEquilibrium(self._loose_place(mechanism.motion)) from mechanism
+                raise NoEquilibrium(self.loose_place(mechanism.motion)) from mechanism
             displacement, out_of_balance, tangents = advance(displacement, solver, out_of_balance, loads, slip)
             largest = np.abs(displacement.reshape(-1, 3)[:, :2]).max()
             if not largest <= self.largest:
                 worst = int(np.abs(displacement.reshape(-1, 3)[:, :2]).max(1).argmax())
                 raise NoEquilibrium(
-                    f"displacements reach {largest:.3g} m {self._place(worst)}, beyond {self.largest:.3g} m (a tenth of"
+                    f"displacements reach {largest:.3g} m {self.place(worst)}, beyond {self.largest:.3g} m (a tenth of"
                     " the outer radius): the ground cannot carry the loads, or the joints are too weak"
-                    + self._joint_states(displacement, slip)
+                    + self.joint_states(displacement, slip)
                 )
         worst = int(np.abs(out_of_balance).argmax()) // 3
         raise NoEquilibrium(
-            f"the largest out-of-balance force is still {np.abs(out_of_balance).max():.3g} N/m {self._place(worst)}"
+            f"the largest out-of-balance force is still {np.abs(out_of_balance).max():.3g} N/m {self.place(worst)}"
             f" after {MAX_ITERATIONS} iterations (wanted {tolerance:.3g}): the loads are close to what the ground and"
-            " the joints can carry" + self._joint_states(displacement, slip)
+            " the joints can carry" + self.joint_states(displacement, slip)
         )
 
     def _advance_symmetric(self, displacement, solver, out_of_balance, loads, slip):
@@ -261,33 +166,3 @@ class RingEquilibrium:
     def _length(self, step):
         nodal = step.reshape(-1, 3)
         return np.sqrt((nodal[:, :2] ** 2).sum() + (self.ring.centre_radius * nodal[:, 2]) ** 2 @ np.ones(len(nodal)))
-
-    def _place(self, node: int) -> str:
-        for joint, sides in enumerate(zip(self.mesh.joint_before, self.mesh.joint_after, strict=True)):
-            if node in sides:
-                return f"at joint {joint + 1} ({self.ring.joint_angles[joint]:g} degrees)"
-        return f"at {np.degrees(self.mesh.node_angle[node]) % 360:.4g} degrees"
-
-    def _loose_place(self, motion: np.ndarray) -> str:
-        message = "the ring is a mechanism: joints too weak to hold it without more ground"
-        if not len(self.joint_unknowns) or not np.isfinite(motion).all():
-            return message
-        jumps = np.abs(motion[self.joint_unknowns] @ self.jumps.T) * [1, 1, self.ring.centre_radius]
-        joint, way = np.unravel_index(int(jumps.argmax()), jumps.shape)
-        if jumps[joint, way] < 1e-3 * np.abs(motion).max():
-            return message + "; it moves as a whole"
-        verb = ("opens", "slides", "turns")[way]
-        return message + f"; joint {joint + 1} ({self.ring.joint_angles[joint]:g} degrees) {verb} most freely"
-
-    def _joint_states(self, displacement: np.ndarray, slip: np.ndarray) -> str:
-        """Which nonlinear joints are not closed, for the message of a failure."""
-        if self.joints.linear:
-            return ""
-        jumps = displacement[self.joint_unknowns] @ self.jumps.T
-        forces = self.joints.forces(jumps, slip)
-        loose = [
-            f"joint {k + 1} is {state}"
-            for k, state in enumerate(self.joints.states(jumps, forces))
-            if state != "closed"
-        ]
-        return f"; {', '.join(loose)}" if loose else "; all joints are closed"
