@@ -1,6 +1,7 @@
 """Checks of a response: utilisations by hand, limits without defaults, and their picture."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -121,6 +122,13 @@ def test_limits_from_toml_are_the_same(tmp_path):
         lines += [f"[{table}]", *(f"{k} = {v!r}".replace("'", '"') for k, v in given.model_dump()[table].items())]
     path.write_text("\n".join(lines))
     assert Limits.from_toml(path) == given
+
+
+def test_limits_in_the_documentation_are_valid(tmp_path):
+    text = (Path(__file__).parent.parent / "docs" / "ring.md").read_text(encoding="utf-8")
+    path = tmp_path / "limits.toml"
+    path.write_text(text.split("```toml\n")[1].split("```")[0], encoding="utf-8")
+    assert Limits.from_toml(path) == limits()
 
 
 @pytest.mark.parametrize(

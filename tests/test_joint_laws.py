@@ -6,7 +6,7 @@ from pydantic import ValidationError
 from scipy.optimize import brentq
 from test_ring_joints_and_springs import ground, mirrored, pressures, ring
 
-from structure import BeamSpringLining, LiningFailure, additional
+from structure import BeamSpringLining, LiningFailure, additional, theory
 from structure.joint_laws import JointLaw, contact_moment, limited_shear
 
 STIFFNESS, HEIGHT, FORCE = 5e8, 0.2, 1.2e6
@@ -190,6 +190,21 @@ def test_open_joints_carry_nothing():
     for name in ("joint_axial_force", "joint_bending_moment"):
         np.testing.assert_array_equal(response[name].where(open_joints, 0.0), 0.0)
     assert response["equilibrium_residual"].max() < 1e-8
+
+
+def test_dry_joints_on_a_clamped_invert():
+    joints = (8.0, 73.0, 180.0, 287.0)
+    dry = dict(NONLINEAR["all"], joint_friction_coefficient=0.5)
+    held = ring(ground=None, support="invert", joint_angles=joints, **dry)
+    loads = theory.theoretical_pressures(
+        outer_diameter=6.6, cover=20.0, buoyant_unit_weight=8900.0, coefficient_at_rest=0.9
+    )
+    response = BeamSpringLining(held).respond(loads)
+    assert np.abs(response["joint_bending_moment"] / response["joint_axial_force"]).max() > 0.2 / 6
+    # 1e-8 is asked for, the clamp beside a joint included.
+    assert response["equilibrium_residual"].max() < 1e-8
+    up = response["spring_sum_vertical"] + response["load_sum_vertical"]
+    assert np.abs(up).max() < 1e-8 * 8e6
 
 
 def test_failure_says_which_joint_and_when():
