@@ -2,6 +2,7 @@
 
 from pydantic import Field
 
+from coupling import load_scene
 from structure import BeamSpringLining, LiningModel, Ring, theory
 
 
@@ -16,16 +17,14 @@ class EquivalentStiffnessLining(LiningModel):
     """No joints; staggered segments take M (1 + zeta), and M (1 - zeta) is left for the joints between them."""
 
     def __init__(self, ring, efficiency, moment_increase=0.0):
-        unjointed = ring.model_dump() | {"joint_angles": (), "efficiency": efficiency}
-        self.homogeneous, self.moment_increase = BeamSpringLining(SoftenedRing(**unjointed)), moment_increase
+        softened = SoftenedRing(**ring.model_dump() | {"joint_angles": (), "efficiency": efficiency})
+        self.homogeneous, self.moment_increase = BeamSpringLining(softened), moment_increase
 
     def respond(self, pressures):
-        response = self.homogeneous.respond(pressures).assign_attrs(model="equivalent-stiffness")
+        response = self.homogeneous.respond(pressures)
         response["bending_moment"] *= 1 + self.moment_increase
-        return response
+        return response.assign_attrs(model="equivalent-stiffness")
 
 
-concrete = dict(concrete_modulus=34.5e9, concrete_poissons_ratio=0.2, concrete_unit_weight=25e3)
-ring = Ring(outer_diameter=6.6, inner_diameter=5.9, **concrete, balance_uplift=True)
 loads = theory.theoretical_pressures(outer_diameter=6.6, cover=20, buoyant_unit_weight=8.9e3, coefficient_at_rest=0.43)
-print(EquivalentStiffnessLining(ring, efficiency=0.7, moment_increase=0.3).respond(loads)["bending_moment"].max())
+print(EquivalentStiffnessLining(load_scene("case-3").ring, efficiency=0.7, moment_increase=0.3).respond(loads))
