@@ -79,10 +79,12 @@ class RingEquilibrium(RingForces):
             part = loads if target == 1.0 else loads_before + target * (loads - loads_before)
             try:
                 reached = self.solve(part, displacement, slip)
-            except NoEquilibrium:
+            except NoEquilibrium as problem:
                 increment /= 4
-                if self.joints.linear or increment < SMALLEST_INCREMENT:
+                if self.joints.linear:
                     raise
+                if increment < SMALLEST_INCREMENT:
+                    raise NoEquilibrium(f"{problem} ({done:.1%} of the load increment was reached)") from problem
                 continue
             if target == 1.0:
                 return reached, slip
@@ -99,7 +101,7 @@ class RingEquilibrium(RingForces):
         tolerance = RESIDUAL_TOLERANCE * scale
         displacement = start.copy()
         out_of_balance, tangents = self.residual(displacement, loads, slip)
-        advance = self._advance_symmetric if self.joints.linear else self._advance
+        advance = self._advance_convex if self.joints.conservative else self._advance
         for _ in range(MAX_ITERATIONS):
             rounding = ROUNDINGS * np.finfo(float).eps * (self.magnitudes @ np.abs(displacement))
             if np.all(np.abs(out_of_balance) <= np.maximum(tolerance, rounding)):
@@ -124,7 +126,7 @@ class RingEquilibrium(RingForces):
             " the joints can carry" + self.joint_states(displacement, slip)
         )
 
-    def _advance_symmetric(self, displacement, solver, out_of_balance, loads, slip):
+    def _advance_convex(self, displacement, solver, out_of_balance, loads, slip):
         """One Newton step; where it overshoots, the root of the residual's work along it is found by bisection.
 
         Overshooting: the work changes sign and does not halve. The forces derive from a convex energy, so this cannot

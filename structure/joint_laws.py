@@ -122,6 +122,8 @@ class JointLaw:
     ----------
     linear : bool
         Three independent linear springs.
+    conservative : bool
+        The forces derive from a convex energy.
     remembers : bool
         The forces depend on the way there (sliding).
     """
@@ -138,6 +140,7 @@ class JointLaw:
         self.remembers = self.friction is not None and bool(ring.joint_angles)
         limited = self.contact_only or self.height is not None or self.friction is not None
         self.linear = not (limited and ring.joint_angles)
+        self.conservative = self.linear or (self.height is None and self.friction is None)
 
     def forces(self, jumps: np.ndarray, slip: np.ndarray) -> JointForces:
         """Forces in the joints.

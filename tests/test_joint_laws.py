@@ -225,7 +225,7 @@ def test_newton_converges_quadratically_near_the_solution(law):
     solution = equilibrium.solve(load, np.zeros_like(load), none)
     # A disturbance of a tenth crosses no kink here: inside one branch of every law the forces are smooth.
     start, error = 1.1 * solution, 0.1
-    advance = equilibrium._advance_symmetric if equilibrium.joints.linear else equilibrium._advance
+    advance = equilibrium._advance_convex if equilibrium.joints.conservative else equilibrium._advance
     residual, tangents = equilibrium.residual(start, load, none)
     for _ in range(4):
         solver = equilibrium.solver(start, tangents, none)
