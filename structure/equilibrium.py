@@ -117,13 +117,13 @@ class RingEquilibrium(RingForces):
                 raise NoEquilibrium(
                     f"displacements reach {largest:.3g} m {self.place(worst)}, beyond {self.largest:.3g} m (a tenth of"
                     " the outer radius): the ground cannot carry the loads, or the joints are too weak"
-                    + self.joint_states(displacement, slip)
+                    + self.conditions(displacement, slip)
                 )
         worst = int(np.abs(out_of_balance).argmax()) // 3
         raise NoEquilibrium(
             f"the largest out-of-balance force is still {np.abs(out_of_balance).max():.3g} N/m {self.place(worst)}"
             f" after {MAX_ITERATIONS} iterations (wanted {tolerance:.3g}): the loads are close to what the ground and"
-            " the joints can carry" + self.joint_states(displacement, slip)
+            " the joints can carry" + self.conditions(displacement, slip)
         )
 
     def _advance_convex(self, displacement, solver, out_of_balance, loads, slip):

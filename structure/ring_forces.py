@@ -133,15 +133,15 @@ class RingForces:
         verb = ("opens", "slides", "turns")[way]
         return message + f"; joint {joint + 1} ({self.ring.joint_angles[joint]:g} degrees) {verb} most freely"
 
-    def joint_states(self, displacement: np.ndarray, slip: np.ndarray) -> str:
-        """Which nonlinear joints are not closed, for the message of a failure."""
-        if self.joints.linear:
-            return ""
-        jumps = displacement[self.joint_unknowns] @ self.jumps.T
-        forces = self.joints.forces(jumps, slip)
-        loose = [
-            f"joint {k + 1} is {state}"
-            for k, state in enumerate(self.joints.states(jumps, forces))
-            if state != "closed"
-        ]
-        return f"; {', '.join(loose)}" if loose else "; all joints are closed"
+    def conditions(self, displacement: np.ndarray, slip: np.ndarray) -> str:
+        """Joints that are not closed and how much of the ring the ground presses on, for the message of a failure."""
+        words = ""
+        if not self.joints.linear:
+            jumps = displacement[self.joint_unknowns] @ self.jumps.T
+            states = self.joints.states(jumps, self.joints.forces(jumps, slip))
+            loose = [f"joint {k + 1} is {state}" for k, state in enumerate(states) if state != "closed"]
+            words += "; " + (", ".join(loose) or "all joints are closed")
+        if self.springs is not None and not self.springs[0].pulls:
+            pressed = self.area[displacement.reshape(-1, 3)[:, 0] > 0].sum() / self.area.sum()
+            words += f"; soil springs press on {pressed:.0%} of the ring"
+        return words
