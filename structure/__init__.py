@@ -10,6 +10,11 @@ _HOMES = {
     "Ground": "structure.ring",
     "LiningModel": "structure.lining",
     "LiningFailure": "structure.lining",
+    "additional": "structure.lining",
+    "check": "structure.checks",
+    "Limits": "structure.checks",
+    "CapacityRule": "structure.checks",
+    "SegmentSection": "structure.sections",
     "BeamSpringLining": "structure.beam_spring",
     "theoretical_pressures": "structure.theory",
 }
