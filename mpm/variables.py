@@ -42,8 +42,10 @@ NODAL_MEANS = 7  # what `element_rates` sums at a node
 RATE_WIDTH = 6
 
 # Soil parameters, one row a soil.
-(S_MODEL, S_LAMBDA, S_G, S_K, S_C_COS, S_SIN, S_SIN_DIL, S_APEX, S_TENSION, S_LOOSE, S_DRAG, S_RHO_S) = range(12)
-SOIL_WIDTH = 12
+(
+    S_MODEL, S_LAMBDA, S_G, S_K, S_C_COS, S_SIN, S_SIN_DIL, S_APEX, S_TENSION, S_LOOSE, S_N0, S_DRAG, S_RHO_S,
+) = range(13)  # fmt: skip
+SOIL_WIDTH = 13
 MODEL_ELASTIC, MODEL_MOHR_COULOMB = 0, 1
 
 # Values that a clamp of the physics may touch; each is counted and reported with the run.
