@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 import xarray as xr
+from threadpoolctl import threadpool_limits
 
 from structure.balance import refuse_unbalanced
 from structure.beam_geometry import RingMesh
@@ -13,7 +14,7 @@ from structure.continuum_equilibrium import SpringEquilibrium
 from structure.continuum_face import spring_feelers, traction_operator
 from structure.continuum_mesh import EDGE_MEAN, ContinuumMesh, Opening
 from structure.continuum_sections import section_displacements, section_forces
-from structure.continuum_stiffness import Concrete, joint_operators, joint_stiffness
+from structure.continuum_stiffness import Concrete, joint_operators, joint_stiffness, nodes_from_unknowns
 from structure.equilibrium import NoEquilibrium
 from structure.lining import LiningFailure, LiningModel, check_pressures, response_dataset
 from structure.ring import Ring
@@ -77,12 +78,17 @@ class ContinuumLining(LiningModel):
         self._theta, self._span = self._grid.mid_angle[order] % (2 * np.pi), self._grid.span[order]
         self._solid = self.mesh.locate(self._theta)[0] >= 0
         concrete = Concrete(ring, self.mesh, width)
-        stiffness = concrete.stiffness()
+        #: Node displacements from the unknowns solved for; jumps across joints are unknowns themselves.
+        self._to_nodes = nodes_from_unknowns(self.mesh)
+        #: 0 for jumps: what works on a face beyond a joint is contained in the force on the unknowns before it.
+        self._whole = np.asarray(self._to_nodes.sum(axis=1) == 1, dtype=float)
+        stiffness = (self._to_nodes.T @ concrete.stiffness() @ self._to_nodes).tocsr()
         if width == 0 and len(self.mesh.joint_before):
-            stiffness = (stiffness + joint_stiffness(ring, self.mesh)).tocsr()
+            # On its own: added before, it would swallow digits of the concrete.
+            stiffness = (stiffness + self._to_nodes.T @ joint_stiffness(ring, self.mesh) @ self._to_nodes).tocsr()
         self._stress = concrete.stresses()
         self._weight = concrete.body_force()
-        self._joints = joint_operators(ring, self.mesh)
+        self._joints = [part @ self._to_nodes for part in joint_operators(ring, self.mesh)]
         self._forces = section_forces(self.mesh, self._stress, ring.centre_radius, self._theta)
         self._movement = section_displacements(self.mesh, self._theta)
         self._quarters = self._quarter_sides()
@@ -90,7 +96,7 @@ class ContinuumLining(LiningModel):
         feel, area = spring_feelers(ring, self.mesh)
         levels = np.arange(2 * self.mesh.n_levels)
         place = (2 * self.mesh.n_levels * self.mesh.neighbour_place()[:, None] + levels).ravel()
-        self._equilibrium = SpringEquilibrium(ring, stiffness, feel, area, place, self._held())
+        self._equilibrium = SpringEquilibrium(ring, stiffness, feel @ self._to_nodes, area, place, self._held())
         fine = np.radians(np.arange(0, 360, 0.5))
         lift = traction_operator(ring, self.mesh, fine)[0] @ np.cos(fine)
         self._unit_balance = lift / self._resultant(lift)[1]
@@ -103,13 +109,13 @@ class ContinuumLining(LiningModel):
     def respond(self, pressures: xr.Dataset) -> xr.Dataset:
         ordered = check_pressures(pressures)
         times = ordered["time"].values
-        displacements, loads, balanced = self._solve(ordered)
+        unknowns, loads, balanced = self._solve(ordered)
+        displacements = (self._to_nodes @ unknowns.T).T
         fields = {"balanced_uplift": balanced}
         fields |= self._internal_forces(displacements)
-        fields |= self._joint_fields(displacements)
-        springs = np.stack([self._equilibrium.spring_forces(row)[0] for row in displacements])
-        fields |= self._balances(displacements, loads, springs)
-        fields["shear_moment_residual"] = self._shear_moment_residual(fields, ordered, displacements)
+        fields |= self._joint_fields(unknowns)
+        fields |= self._balances(unknowns, loads)
+        fields["shear_moment_residual"] = self._shear_moment_residual(fields, ordered, unknowns)
         fields |= self._movements(displacements)
         return self._dataset(pressures, fields, times)
 
@@ -128,7 +134,7 @@ class ContinuumLining(LiningModel):
             radius [m] and element (point).
         """
         ordered = check_pressures(pressures)
-        displacements = self._solve(ordered)[0]
+        displacements = (self._to_nodes @ self._solve(ordered)[0].T).T
         stress = self._stress
         values = (stress.radial, stress.hoop, stress.shear)
         fields = {
@@ -157,13 +163,16 @@ class ContinuumLining(LiningModel):
         mesh = self.mesh
         if self.ring.ground is not None:
             return np.zeros(0, dtype=int)
-        line = int(np.argmin(np.abs(mesh.angle[:, mesh.layers] % (2 * np.pi) - np.pi)))
+        distance = np.abs(mesh.angle[:, mesh.layers] % (2 * np.pi) - np.pi)
+        # The unknowns behind a joint are jumps: holding them would close the joint, not hold the ring.
+        distance[mesh.joint_after] = np.inf
+        line = int(np.argmin(distance))
         first = 2 * line * mesh.n_levels
         whole = first + np.arange(2 * mesh.n_levels)
         return whole if self.ring.support == "invert" else whole[[1, -2, -1]]
 
     def _solve(self, ordered):
-        """Displacements, nodal loads (n_times, n_unknowns) and the uplift balanced among them."""
+        """Unknowns and the loads on them (n_times, n_unknowns), and the uplift balanced among the loads."""
         theta, times = np.radians(ordered["theta"].values.astype(float)), ordered["time"].values
         by_pressure, by_shear = traction_operator(self.ring, self.mesh, theta)
         pressure = (ordered["soil_pressure"] + ordered["water_pressure"]).values.astype(float)
@@ -173,21 +182,26 @@ class ContinuumLining(LiningModel):
             balanced = self._resultant(loads)[1]
             loads = loads - balanced[:, None] * self._unit_balance
         refuse_unbalanced(self.ring, self._resultant(loads), np.array([_magnitude(row) for row in loads]), times)
-        displacements = np.zeros_like(loads)
+        loads = (self._to_nodes.T @ loads.T).T
+        unknowns = np.zeros_like(loads)
         self._equilibrium.iterations.clear()
         start = np.zeros(loads.shape[1])
-        for index, load in enumerate(loads):
-            try:
-                start = self._equilibrium.solve(load, start)
-            except NoEquilibrium as problem:
-                horizontal, vertical, _ = self._resultant(load)
-                raise LiningFailure(
-                    f"ring: no equilibrium at time {times[index]:g} s (loads sum to {horizontal:.4g} N/m to the right,"
-                    f" {vertical:.4g} N/m up): {problem}",
-                    float(times[index]),
-                ) from problem
-            displacements[index] = start
-        return displacements, loads, balanced
+        # Factors are so small that threads only wait for each other: on a busy machine two cost 200 times one's time.
+        with threadpool_limits(limits=1, user_api="blas"):
+            for index, load in enumerate(loads):
+                unknowns[index] = start = self._solve_one(load, start, float(times[index]))
+        return unknowns, loads, balanced
+
+    def _solve_one(self, load, start, time):
+        try:
+            return self._equilibrium.solve(load, start)
+        except NoEquilibrium as problem:
+            horizontal, vertical, _ = self._resultant(load * self._whole)
+            raise LiningFailure(
+                f"ring: no equilibrium at time {time:g} s (loads sum to {horizontal:.4g} N/m to the right,"
+                f" {vertical:.4g} N/m up): {problem}",
+                time,
+            ) from problem
 
     def _resultant(self, forces: np.ndarray) -> np.ndarray:
         """Sums to the right and up, and clockwise couple about the axis over the centre-line radius, (3, ...) [N/m]."""
@@ -206,8 +220,8 @@ class ContinuumLining(LiningModel):
         values[:, ~self._solid] = np.nan
         return values
 
-    def _joint_fields(self, displacements):
-        opening, dislocation, rotation = ((part @ displacements.T).T for part in self._joints)
+    def _joint_fields(self, unknowns):
+        opening, dislocation, rotation = ((part @ unknowns.T).T for part in self._joints)
         spring = joint_spring(self.ring)
         normal = spring.normal
         if self.joint == "equivalent_strip":
@@ -221,15 +235,16 @@ class ContinuumLining(LiningModel):
             "joint_bending_moment": spring.rotation * rotation,
         }
 
-    def _balances(self, displacements, loads, springs):
+    def _balances(self, unknowns, loads):
         held = self._equilibrium.held
-        internal = (self._equilibrium.stiffness @ displacements.T).T
+        springs = np.stack([self._equilibrium.spring_forces(row)[0] for row in unknowns])
+        internal = (self._equilibrium.stiffness @ unknowns.T).T
         reactions = springs.copy()
         reactions[:, held] += (internal - loads - springs)[:, held]
-        load_sum, reaction_sum = self._resultant(loads), self._resultant(reactions)
+        load_sum, reaction_sum = self._resultant(loads * self._whole), self._resultant(reactions * self._whole)
         gap = np.abs(load_sum + reaction_sum).max(0)
         node_gap = np.abs(loads + reactions - internal).max(1)
-        magnitude = np.array([_magnitude(row) for row in loads])
+        magnitude = np.array([_magnitude(row) for row in loads * self._whole])
         return {
             "load_sum_horizontal": load_sum[0],
             "load_sum_vertical": load_sum[1],
@@ -238,7 +253,7 @@ class ContinuumLining(LiningModel):
             "equilibrium_residual": np.maximum(gap, node_gap) / np.maximum(magnitude, 1e-300),
         }
 
-    def _shear_moment_residual(self, fields, ordered, displacements):
+    def _shear_moment_residual(self, fields, ordered, unknowns):
         """Largest |Q + dM/ds + couple| between neighbouring angles, from the reported forces.
 
         The couple per arc of the centre line is what shear and tangential soil springs on the outer face bring, and
@@ -258,7 +273,7 @@ class ContinuumLining(LiningModel):
         )
         if ring.ground is not None and ring.ground.slip_at == "outer_face":
             column = self.mesh.locate(theta)[0]
-            slip = np.stack([self._equilibrium.reactions(row)[0] for row in displacements])
+            slip = np.stack([self._equilibrium.reactions(row)[0] for row in unknowns])
             slip = slip[:, len(self.mesh.column_lines) :]
             traction = traction - weight * slip[:, column] - (1 - weight) * slip[:, column[following]]
         lever = ring.thickness / 2 * ring.outer_radius / ring.centre_radius

@@ -102,7 +102,7 @@ class Concrete:
 
         @LinearForm
         def weight(v, w):
-            return -unit_weight * v.value[1]
+            return -unit_weight * v[1]
 
         forces = np.zeros(self.n_unknowns)
         forces[self._numbers(basis)] = weight.assemble(basis)
@@ -115,7 +115,7 @@ class Concrete:
         along, across = np.meshgrid(STRESS_POINTS, STRESS_POINTS)
         points = np.stack([along.ravel(), across.ravel()])
         basis = Basis(self._skfem_mesh, self._element, quadrature=(points, np.full(4, 0.25)))
-        place = basis.global_coordinates().value
+        place = basis.global_coordinates()
         angle = np.arctan2(place[0], place[1])
         moduli = [modulus[:, None] for modulus in self._moduli]
         row = np.arange(angle.size).reshape(angle.shape)
@@ -132,7 +132,7 @@ class Concrete:
         operators = (
             sparse.coo_array((np.concatenate(kept), where), shape=shape).tocsr() @ self.to_cartesian for kept in values
         )
-        return StressOperators(*operators, angle.ravel() % (2 * np.pi), np.hypot(*place).ravel())
+        return StressOperators(*operators, angle.ravel() % (2 * np.pi), np.hypot(place[0], place[1]).ravel())
 
     def _numbers(self, basis) -> np.ndarray:
         """Our number (2 node + direction, Cartesian) of each unknown of skfem."""
@@ -180,6 +180,22 @@ def _stress(radial, hoop, shear, moduli):
         coupling * radial + direct_hoop * hoop,
         shear_modulus * shear,
     )
+
+
+def nodes_from_unknowns(mesh: ContinuumMesh) -> sparse.csr_array:
+    """Displacements of the nodes from the unknowns that are solved for, (n_unknowns, n_unknowns).
+
+    On the clockwise face of a joint the unknown is the jump across it. A joint of 1e15 N/m2 then acts on tiny unknowns
+    of its own, not on the difference of two large ones, whose rounding it would multiply.
+    """
+    n_unknowns = 2 * mesh.n_lines * mesh.n_levels
+    along = np.arange(2 * mesh.n_levels)
+    if not len(mesh.joint_after) or mesh.column_is_strip.any():
+        return sparse.eye_array(n_unknowns, format="csr")
+    after = (2 * mesh.n_levels * mesh.joint_after[:, None] + along).ravel()
+    before = (2 * mesh.n_levels * mesh.joint_before[:, None] + along).ravel()
+    rows, columns = np.append(np.arange(n_unknowns), after), np.append(np.arange(n_unknowns), before)
+    return sparse.coo_array((np.ones(len(rows)), (rows, columns)), shape=(n_unknowns, n_unknowns)).tocsr()
 
 
 class JointOperators(NamedTuple):
