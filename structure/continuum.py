@@ -47,8 +47,8 @@ class ContinuumLining(LiningModel):
     strip_width : float
         Of the equivalent strip [m].
     opening : Opening or tuple of float, optional
-        Angle [degree] and width [m] of a slot with parallel walls through the lining, the open gate. There is no
-        lining and no load in it; N, Q, M and displacements there are NaN.
+        Angle [degree], width [m] and cut share of the open gate. In a slot (cut = 1, the default) there is no lining;
+        N, Q, M and displacements there are NaN.
 
     Notes
     -----
@@ -90,6 +90,7 @@ class ContinuumLining(LiningModel):
         self._weight = concrete.body_force()
         self._joints = [part @ self._to_nodes for part in joint_operators(ring, self.mesh)]
         self._forces = section_forces(self.mesh, self._stress, ring.centre_radius, self._theta)
+        self._strip_forces = section_forces(self.mesh, self._stress, ring.centre_radius, np.radians(ring.joint_angles))
         self._movement = section_displacements(self.mesh, self._theta)
         self._quarters = self._quarter_sides()
         self._share = self._node_share()
@@ -163,7 +164,7 @@ class ContinuumLining(LiningModel):
         mesh = self.mesh
         if self.ring.ground is not None:
             return np.zeros(0, dtype=int)
-        distance = np.abs(mesh.angle[:, mesh.layers] % (2 * np.pi) - np.pi)
+        distance = np.abs(mesh.angle % (2 * np.pi) - np.pi)
         # The unknowns behind a joint are jumps: holding them would close the joint, not hold the ring.
         distance[mesh.joint_after] = np.inf
         line = int(np.argmin(distance))
@@ -223,16 +224,15 @@ class ContinuumLining(LiningModel):
     def _joint_fields(self, unknowns):
         opening, dislocation, rotation = ((part @ unknowns.T).T for part in self._joints)
         spring = joint_spring(self.ring)
-        normal = spring.normal
+        forces = [-spring.normal * opening, spring.shear * dislocation, spring.rotation * rotation]
         if self.joint == "equivalent_strip":
-            normal = 12 * spring.rotation / self.ring.thickness**2
+            forces = [(part @ unknowns.T).T for part in self._strip_forces]
+        names = ("joint_axial_force", "joint_shear_force", "joint_bending_moment")
         return {
             "joint_opening": opening,
             "joint_dislocation": dislocation,
             "joint_rotation": rotation,
-            "joint_axial_force": -normal * opening,
-            "joint_shear_force": spring.shear * dislocation,
-            "joint_bending_moment": spring.rotation * rotation,
+            **dict(zip(names, forces, strict=True)),
         }
 
     def _balances(self, unknowns, loads):
@@ -271,11 +271,13 @@ class ContinuumLining(LiningModel):
         traction = np.stack(
             [np.interp(middle % (2 * np.pi), around, np.tile(row, 3)) for row in ordered["soil_shear"].values]
         )
+        column = self.mesh.locate(theta)[0]
+        share = self.mesh.column_share[column]
+        traction = traction * (weight * share + (1 - weight) * share[following])
         if ring.ground is not None and ring.ground.slip_at == "outer_face":
-            column = self.mesh.locate(theta)[0]
             slip = np.stack([self._equilibrium.reactions(row)[0] for row in unknowns])
-            slip = slip[:, len(self.mesh.column_lines) :]
-            traction = traction - weight * slip[:, column] - (1 - weight) * slip[:, column[following]]
+            slip = share * slip[:, len(self.mesh.column_lines) :][:, column]
+            traction = traction - weight * slip - (1 - weight) * slip[:, following]
         lever = ring.thickness / 2 * ring.outer_radius / ring.centre_radius
         eccentric = ring.concrete_unit_weight * ring.thickness**3 / 12 / ring.centre_radius * np.sin(middle)
         gap = np.abs(mean_shear + (moment[:, following] - moment) / arc + lever * traction + eccentric)
@@ -287,7 +289,7 @@ class ContinuumLining(LiningModel):
     def _node_share(self):
         """Share of every node in the mean over the ring, (n_nodes,)."""
         mesh = self.mesh
-        angles = mesh.column_angles(mesh.layers)
+        angles = mesh.column_angles()
         share = np.zeros((mesh.n_lines, mesh.n_levels))
         span = angles[:, 2] - angles[:, 0]
         np.add.at(share, mesh.column_lines, span[:, None, None] * EDGE_MEAN[:, None] * mesh.level_mean)
@@ -298,9 +300,9 @@ class ContinuumLining(LiningModel):
         sides = []
         for quarter in np.arange(4) * np.pi / 2:
             off = 1e-6
-            if self.opening is not None:
+            if self.opening is not None and self.opening.cut == 1:
                 distance = abs((quarter - np.radians(self.opening.angle) + np.pi) % (2 * np.pi) - np.pi)
-                half = np.arcsin(self.opening.width / 2 / self.mesh.radius[0])
+                half = self.opening.width / 2 / self.ring.centre_radius
                 off = half + distance if distance < half else off
             sides.append(section_displacements(self.mesh, np.array([quarter - off, quarter + off]) % (2 * np.pi))[0])
         return sides
@@ -340,6 +342,7 @@ class ContinuumLining(LiningModel):
         }
         if self.opening is not None:
             attributes |= {"opening_angle": float(self.opening.angle), "opening_width": float(self.opening.width)}
+            attributes["opening_cut"] = float(self.opening.cut)
         if self.ring.ground is not None:
             normal, tangential = limit_pressures(self.ring.ground)
             attributes["limit_pressures"] = f"normal {normal:.6g} Pa, tangential {tangential:.6g} Pa"
@@ -394,6 +397,11 @@ def _refuse_options(ring, columns, layers, joint, strip_width, opening):
         raise ValueError(
             f"strip_width must be above 0 and below the thickness {ring.thickness:g} m, got {strip_width:g} m;"
             " 0.02 is a usual gap"
+        )
+    if opening is not None and not 0 < opening.cut <= 1:
+        raise ValueError(
+            f"opening: cut must be above 0 and at most 1, the share of the tunnel's length that is open, got"
+            f" {opening.cut:g}; 1 is a slot through the ring"
         )
     if opening is not None and not 0 < opening.width < ring.inner_diameter / 4:
         raise ValueError(

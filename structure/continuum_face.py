@@ -27,9 +27,10 @@ def traction_operator(ring: Ring, mesh: ContinuumMesh, theta: np.ndarray) -> tup
     Returns
     -------
     pressure, shear : (n_unknowns, n_theta) sparse
-        Forces [N/m] per Pa, traction linear between the samples. No force on the opening.
+        Forces [N/m] per Pa, traction linear between the samples. No force on the opening, and a hole's
+        share of it is left out.
     """
-    edges = mesh.column_angles(mesh.n_levels - 1)
+    edges = mesh.column_angles()
     n_unknowns = 2 * mesh.n_lines * mesh.n_levels
     span = edges[:, 2] - edges[:, 0]
     pieces = int(np.ceil(span.max() / LONGEST_PIECE - 1e-6))
@@ -40,7 +41,7 @@ def traction_operator(ring: Ring, mesh: ContinuumMesh, theta: np.ndarray) -> tup
     outer = mesh.column_lines * mesh.n_levels + mesh.n_levels - 1
     # The pressure follows the circle's normal at its own angle, not at the node that takes a share of it.
     lean = angle[:, :, None] - edges[:, None, :]
-    area = (ring.outer_radius * span[:, None] * weight)[:, :, None] * edge_shapes(place)
+    area = (ring.outer_radius * (mesh.column_share * span)[:, None] * weight)[:, :, None] * edge_shapes(place)
     parts = {
         "pressure": (-area * np.cos(lean), -area * np.sin(lean)),
         "shear": (-area * np.sin(lean), area * np.cos(lean)),
@@ -70,8 +71,8 @@ def spring_feelers(ring: Ring, mesh: ContinuumMesh) -> tuple[sparse.csr_array, n
     area : (2 n_columns,) float64
         Area of the outer face of each [m2/m]; a reaction [Pa] becomes the nodal forces -feel^T (area * reaction).
     """
-    edges = mesh.column_angles(mesh.n_levels - 1)
-    area = ring.outer_radius * (edges[:, 2] - edges[:, 0])
+    edges = mesh.column_angles()
+    area = ring.outer_radius * mesh.column_share * (edges[:, 2] - edges[:, 0])
     outer = np.zeros(mesh.n_levels)
     outer[-1] = 1.0
     count = len(mesh.column_lines)

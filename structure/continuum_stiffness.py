@@ -69,7 +69,8 @@ class Concrete:
             shape=(self.n_unknowns, self.n_unknowns),
         ).tocsr()
         self._strip = np.repeat(mesh.column_is_strip, mesh.layers)
-        self._moduli = _moduli(ring, self._strip, strip_width)
+        self._share = np.repeat(mesh.column_share, mesh.layers)
+        self._moduli = [self._share * modulus for modulus in _moduli(ring, self._strip, strip_width)]
 
     def stiffness(self) -> sparse.csr_array:
         """Stiffness of concrete and strips, (n_unknowns, n_unknowns)."""
@@ -98,7 +99,7 @@ class Concrete:
         from skfem import Basis, LinearForm
 
         basis = Basis(self._skfem_mesh, self._element, intorder=5)
-        unit_weight = self.ring.concrete_unit_weight
+        unit_weight = (self.ring.concrete_unit_weight * self._share)[:, None]
 
         @LinearForm
         def weight(v, w):
@@ -218,11 +219,13 @@ def joint_operators(ring: Ring, mesh: ContinuumMesh) -> JointOperators:
     for layer in range(mesh.layers):
         nodes = slice(2 * layer, 2 * layer + 3)
         slope[nodes] += 12 / ring.thickness**3 * height * EDGE_MASS @ offset[nodes]
-    return JointOperators(
-        _face_jump(mesh, mesh.level_mean, 1, 1.0),
-        _face_jump(mesh, mesh.level_mean, 0, -1.0),
-        _face_jump(mesh, slope, 1, 1.0),
-    )
+    opening = _face_jump(mesh, mesh.level_mean, 1)
+    rotation = _face_jump(mesh, slope, 1)
+    # Faces apart slide past each other when the whole ring turns; that is no dislocation of the joint.
+    turn = _face_jump(mesh, slope, 1, before=1.0) / 2
+    width = ring.centre_radius * ((mesh.angle[mesh.joint_after] - mesh.angle[mesh.joint_before] + 1) % (2 * np.pi) - 1)
+    dislocation = -_face_jump(mesh, mesh.level_mean, 0) - sparse.diags_array(width) @ turn
+    return JointOperators(opening, dislocation.tocsr(), rotation)
 
 
 def joint_stiffness(ring: Ring, mesh: ContinuumMesh) -> sparse.csr_array:
@@ -241,7 +244,7 @@ def joint_stiffness(ring: Ring, mesh: ContinuumMesh) -> sparse.csr_array:
         face[nodes, nodes] += height / ring.thickness * EDGE_MASS
     matrix = sparse.csr_array((n_unknowns, n_unknowns))
     for direction, stiffness in ((1, spring.normal), (0, spring.shear)):
-        jumps = [_face_jump(mesh, row, direction, 1.0) for row in np.eye(mesh.n_levels)]
+        jumps = [_face_jump(mesh, row, direction) for row in np.eye(mesh.n_levels)]
         for k, left in enumerate(jumps):
             for m in np.flatnonzero(face[k]):
                 matrix = matrix + stiffness * face[k, m] * (left.T @ jumps[m])
@@ -250,15 +253,25 @@ def joint_stiffness(ring: Ring, mesh: ContinuumMesh) -> sparse.csr_array:
     return (matrix + rest * (rotation.T @ rotation)).tocsr()
 
 
-def _face_jump(mesh: ContinuumMesh, weights: np.ndarray, direction: int, sign: float) -> sparse.csr_array:
-    """Weighted displacement in a direction of the clockwise face less that of the other face."""
+def _face_jump(mesh: ContinuumMesh, weights: np.ndarray, direction: int, before: float = -1.0) -> sparse.csr_array:
+    """Weighted displacement of the clockwise face plus `before` times that of the other, in the joint's own axes.
+
+    Faces of a strip lie at angles of their own; direction 0 is outward, 1 clockwise at the middle of the joint.
+    """
     n_joints = len(mesh.joint_before)
+    apart = (mesh.angle[mesh.joint_after] - mesh.angle[mesh.joint_before] + 1) % (2 * np.pi) - 1
     level = np.arange(mesh.n_levels)
-    after = 2 * (mesh.joint_after[:, None] * mesh.n_levels + level) + direction
-    before = 2 * (mesh.joint_before[:, None] * mesh.n_levels + level) + direction
-    rows = np.repeat(np.arange(n_joints), mesh.n_levels)
-    values = np.tile(sign * weights, n_joints)
+    rows, columns, values = [], [], []
+    for lines, off, sign in ((mesh.joint_after, apart / 2, 1.0), (mesh.joint_before, -apart / 2, before)):
+        first = 2 * (lines[:, None] * mesh.n_levels + level)
+        axes = (np.cos(off), -np.sin(off)) if direction == 0 else (np.sin(off), np.cos(off))
+        for way in (0, 1):
+            rows.append(np.repeat(np.arange(n_joints), mesh.n_levels))
+            columns.append((first + way).ravel())
+            values.append((sign * axes[way][:, None] * weights).ravel())
+    values = np.concatenate(values)
+    kept = values != 0
     return sparse.coo_array(
-        (np.concatenate([values, -values]), (np.tile(rows, 2), np.concatenate([after.ravel(), before.ravel()]))),
+        (values[kept], (np.concatenate(rows)[kept], np.concatenate(columns)[kept])),
         shape=(n_joints, 2 * mesh.n_lines * mesh.n_levels),
     ).tocsr()
