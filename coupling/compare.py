@@ -30,7 +30,7 @@ OFFSETS = {
     "joint_bending_moment": "joint_axial_force",
     "joint_rotation": "joint_axial_force",
 }
-CURVED_SECTION = "curved section: N t²/(12 R)"
+CURVED_SECTION = "curved section: N t²/(12 R), less what joints release"
 
 
 class Comparison(NamedTuple):
@@ -93,7 +93,7 @@ def compare(source, first="beam-spring", second="continuum", open_gate=None):
         rows.append(_row(name, differences[name], responses[first], CURVED_SECTION if known else ""))
         if known:
             rest = differences[f"{name}_beyond_offset"]
-            rows.append(_row(name, rest, responses[first], "", " less N t²/(12 R)"))
+            rows.append(_row(name, rest, responses[first], "", ", curved section apart"))
     return Comparison(responses, differences, rows, seconds)
 
 
@@ -156,6 +156,8 @@ def _differences(first, second, ring):
     """Second less first, with the offset of the curved section and what is left without it."""
     import xarray as xr
 
+    from structure.theory import curved_section_moment
+
     missing = sorted(set(QUANTITIES) - set(first.data_vars) | set(QUANTITIES) - set(second.data_vars))
     if missing:
         raise RunRefused(f"compare: both models must give {', '.join(missing)}; see structure.lining.RESPONSE")
@@ -169,13 +171,21 @@ def _differences(first, second, ring):
             units=meaning["units"], long_name=f"difference of the {meaning['long_name']}"
         )
     for name, axial in OFFSETS.items():
-        offset = first[axial] * ring.thickness**2 / (12 * ring.centre_radius)
+        offset = curved_section_moment(
+            first[axial],
+            ring.thickness,
+            ring.centre_radius,
+            ring.bending_stiffness,
+            len(ring.joint_angles),
+            ring.joint_rotational_stiffness,
+        )
         if name == "joint_rotation":
             stiffness = ring.joint_rotational_stiffness
             offset = offset / stiffness if stiffness else offset * 0
         sign = 1 if second.attrs.get("model") == "continuum" else -1
         fields[f"{name}_beyond_offset"] = (fields[name] - sign * offset).assign_attrs(
-            units=fields[name].attrs["units"], long_name=f"{fields[name].attrs['long_name']}, less N t2/(12 R)"
+            units=fields[name].attrs["units"],
+            long_name=f"{fields[name].attrs['long_name']}, less the moment of the curved section",
         )
     dataset = xr.Dataset(fields)
     if "inflow_mass" in first:

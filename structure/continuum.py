@@ -107,6 +107,11 @@ class ContinuumLining(LiningModel):
         """Newton's iterations at every time of the last response."""
         return self._equilibrium.iterations
 
+    @property
+    def residuals(self) -> list[float]:
+        """Largest out-of-balance force of every iteration at the last time [N/m]."""
+        return self._equilibrium.residuals
+
     def respond(self, pressures: xr.Dataset) -> xr.Dataset:
         ordered = check_pressures(pressures)
         times = ordered["time"].values

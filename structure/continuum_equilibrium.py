@@ -45,6 +45,7 @@ class SpringEquilibrium:
         self.feel, self.area = feel, area
         self.pull = feel.T.tocsr()
         self.iterations: list[int] = []
+        self.residuals: list[float] = []
         free = np.ones(stiffness.shape[0])
         free[held] = 0.0
         constant = _lower_part(stiffness, place, free)
@@ -122,7 +123,9 @@ class SpringEquilibrium:
         return step[self.place]
 
     def solve(self, loads: np.ndarray, start: np.ndarray) -> np.ndarray:
-        """Displacements in equilibrium with nodal loads, from a first guess; appends to `iterations`.
+        """Displacements in equilibrium with nodal loads, from a first guess.
+
+        Appends their number to `iterations`; `residuals` are the largest out-of-balance forces of this solution [N/m].
 
         Newton's method with the line search of :class:`structure.equilibrium.RingEquilibrium`: the forces derive from
         a convex energy, so it cannot cycle.
@@ -135,9 +138,11 @@ class SpringEquilibrium:
         tolerance = RESIDUAL_TOLERANCE * np.abs(loads).sum()
         displacement = start.copy()
         out_of_balance, tangents = self.residual(displacement, loads)
+        self.residuals = []
         for iteration in range(MAX_ITERATIONS):
             rounding = ROUNDINGS * np.finfo(float).eps * (self.magnitudes @ np.abs(displacement)).max()
-            if np.abs(out_of_balance).max() <= max(tolerance, rounding):
+            self.residuals.append(float(np.abs(out_of_balance).max()))
+            if self.residuals[-1] <= max(tolerance, rounding):
                 self.iterations.append(iteration)
                 return displacement
             step = self._direction(out_of_balance, tangents)

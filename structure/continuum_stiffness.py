@@ -72,12 +72,20 @@ class Concrete:
         self._share = np.repeat(mesh.column_share, mesh.layers)
         self._moduli = [self._share * modulus for modulus in _moduli(ring, self._strip, strip_width)]
 
+    def _moduli_at(self, radius: np.ndarray) -> list[np.ndarray]:
+        """Radial, coupling, hoop and shear modulus at points of every element, (n_elements, n) each [Pa]."""
+        radial, coupling, hoop, shear = (np.broadcast_to(modulus[:, None], radius.shape) for modulus in self._moduli)
+        # A strip between radial faces is wider outside; this keeps its stiffness per area of the face the same.
+        widening = np.where(self._strip[:, None], radius / self.ring.centre_radius, 1.0)
+        return [radial, coupling, hoop * widening, shear * widening]
+
     def stiffness(self) -> sparse.csr_array:
         """Stiffness of concrete and strips, (n_unknowns, n_unknowns)."""
         from skfem import Basis, BilinearForm
 
         basis = Basis(self._skfem_mesh, self._element, intorder=5)
-        moduli = [np.broadcast_to(modulus[:, None], basis.dx.shape) for modulus in self._moduli]
+        where = basis.global_coordinates()
+        moduli = self._moduli_at(np.hypot(where[0], where[1]))
 
         def strains(field, place):
             return _polar(field.grad, np.arctan2(place[0], place[1]))
@@ -118,7 +126,7 @@ class Concrete:
         basis = Basis(self._skfem_mesh, self._element, quadrature=(points, np.full(4, 0.25)))
         place = basis.global_coordinates()
         angle = np.arctan2(place[0], place[1])
-        moduli = [modulus[:, None] for modulus in self._moduli]
+        moduli = self._moduli_at(np.hypot(place[0], place[1]))
         row = np.arange(angle.size).reshape(angle.shape)
         rows, columns, values = [], [], ([], [], [])
         for local in range(18):

@@ -187,6 +187,28 @@ def hinge_moments(
     return rigid_moments - release / flexibility
 
 
+def curved_section_moment(
+    axial_force: np.ndarray,
+    thickness: float,
+    radius: float,
+    bending_stiffness: float,
+    n_joints: int = 0,
+    rotational_stiffness: float = np.inf,
+) -> np.ndarray:
+    """Moment [N m/m] by which a thick ring exceeds one of straight beams: N t^2/(12 R), less what joints release.
+
+    The inner fibres of a curved section are shorter, so thrust on the centre line turns it as a moment -N t^2/(12 R)
+    would. In a closed ring those rotations, and those of n joints, must add up to zero, which takes a uniform moment
+    of N t^2/(12 R)/(1 + n EI/(2 pi R k)). Exact for a uniform N in a thin ring (Winkler's curved beam, first order).
+    """
+    offset = axial_force * thickness**2 / (12 * radius)
+    if n_joints == 0:
+        return offset
+    if rotational_stiffness == 0:
+        return 0 * offset
+    return offset / (1 + n_joints * bending_stiffness / (2 * np.pi * radius * rotational_stiffness))
+
+
 def einstein_schwartz_full_slip_moment(stress_ratio: float, poissons_ratio: float, flexibility_ratio: float) -> float:
     """Largest M/(P R^2) of a lining that slips freely in elastic ground, P the overburden stress.
 
