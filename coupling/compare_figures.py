@@ -3,10 +3,12 @@
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from coupling.figures import STYLE, _closed, _crown_up, _legend_below, _moment, _radial_ticks
 
 COLOURS, DASHES = ("0.25", "#c1272d"), ("-", (0, (4, 2)))
+MOST_JOINTS_NAMED = 8
 PANELS = (
     ("axial_force", "axial force N [kN/m]"),
     ("shear_force", "shear force Q [kN/m]"),
@@ -68,19 +70,23 @@ def joints_compared(responses):
     one = next(iter(responses.values()))
     mass = "inflow_mass" in one
     abscissa = one["inflow_mass" if mass else "time"].values
-    colours = matplotlib.colormaps["viridis"](np.linspace(0, 0.9, one.sizes["joint"]))
+    joints = one["joint"].values
+    colours = matplotlib.colormaps["viridis"](np.linspace(0, 0.9, len(joints)))
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(7.4, 3.2), layout="constrained")
         axes = figure.subplots(1, 3)
         for axis, (name, title) in zip(axes, JOINTS, strict=True):
-            for (model, response), dash in zip(responses.items(), DASHES, strict=False):
+            for response, dash in zip(responses.values(), DASHES, strict=False):
                 for k, colour in enumerate(colours):
-                    label = f"joint {k + 1}, {model}" if k == 0 else (f"{k + 1}" if dash == "-" else None)
-                    values = 1e3 * response[name].values[:, k]
                     marker = "o" if len(abscissa) == 1 else None
-                    axis.plot(abscissa, values, color=colour, ls=dash, lw=1.1, label=label, marker=marker, ms=3)
+                    axis.plot(abscissa, 1e3 * response[name].values[:, k], color=colour, ls=dash, marker=marker, ms=3)
             axis.set_title(title)
             axis.set_xlabel("inflow mass [kg/m]" if mass else "time [s]")
             axis.grid(True)
-        _legend_below(figure, axes[0])
+        handles = [
+            Line2D([], [], color="0.2", ls=dash, label=model) for model, dash in zip(responses, DASHES, strict=False)
+        ]
+        shown = sorted({0, len(joints) - 1}) if len(joints) > MOST_JOINTS_NAMED else range(len(joints))
+        handles += [Line2D([], [], color=colours[k], label=f"joint {joints[k]}") for k in shown]
+        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return figure

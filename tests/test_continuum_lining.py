@@ -169,11 +169,11 @@ def test_newton_converges_quadratically():
     given = ContinuumLining(ring())
     given.respond(pressures(3.0))
     residuals = np.array(given.residuals)
-    near = residuals[residuals < 1e-3 * residuals[0]]
+    near = residuals[residuals < 1e-2 * residuals[0]]
     assert len(near) >= 2
-    # Quadratic: every step squares the relative residual, but for a constant; the last is stopped by rounding.
+    # Quadratic: every step at least squares the relative residual; the last is stopped by rounding.
     for before, after in pairwise(near):
-        assert after / residuals[0] < max(100 * (before / residuals[0]) ** 2, 1e-10)
+        assert after / residuals[0] < max((before / residuals[0]) ** 2, 1e-10)
 
 
 def refinement_errors(columns, layers):
