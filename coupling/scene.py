@@ -168,19 +168,21 @@ def derived_ring(scene: MpmScene) -> dict[str, Any]:
 def ground_at_axis(scene: MpmScene, depth: float) -> dict[str, float]:
     """Soil parameters and effective stresses [Pa] at `depth` [m], for the soil springs of the ring.
 
-    Vertical effective stress is the weight of the saturated column above less the water pressure; the soil is saturated
-    throughout, as in the MPM, and above the water table its water hangs at zero pressure. Horizontal: k0 times that.
+    Vertical effective stress is the weight of the column above less the water pressure; the soil is saturated
+    throughout, as in the MPM, and above the water table its water hangs at zero pressure; without water it is dry.
+    Horizontal: k0 times that.
     """
-    water = scene.water
+    water_density = scene.water.density if scene.water is not None else 0.0
+    table_depth = scene.water.table_depth if scene.water is not None else 0.0
     vertical = 0.0
     bottoms = [soil.top_depth for soil in scene.soils[1:]] + [math.inf]
     here = scene.soils[0]
     for soil, bottom in zip(scene.soils, bottoms, strict=True):
         if soil.top_depth < depth:
             here = soil
-            density = (1 - soil.porosity) * soil.grain_density + soil.porosity * water.density
+            density = (1 - soil.porosity) * soil.grain_density + soil.porosity * water_density
             vertical += density * scene.gravity * (min(depth, bottom) - soil.top_depth)
-    vertical -= water.density * scene.gravity * max(0.0, depth - water.table_depth)
+    vertical -= water_density * scene.gravity * max(0.0, depth - table_depth)
     return {
         "youngs_modulus": here.youngs_modulus,
         "poissons_ratio": here.poissons_ratio,
@@ -239,9 +241,17 @@ def _read_file(name: str) -> str:
         raise SceneError(f"scene {name!r}: must be UTF-8 text, got: {error}; this is no scene file") from None
 
 
+#: Tables that a scene may leave out although its base has them: `water = "none"` makes it dry.
+OPTIONAL_TABLES = ("water", "gate", "ring")
+NONE = "none"
+
+
 def _merge(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     merged = dict(base)
     for key, value in changes.items():
+        if value == NONE and key in OPTIONAL_TABLES:
+            merged.pop(key, None)
+            continue
         both = isinstance(value, dict) and isinstance(merged.get(key), dict)
         merged[key] = _merge(merged[key], value) if both else value
     return merged

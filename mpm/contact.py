@@ -9,6 +9,8 @@ As a linear complementarity problem its matrix has positive principal minors, so
 the four cases holds. Drag is implicit: no permeability limits the time step.
 """
 
+from functools import cache
+
 from mpm.jit import inline_kernel, kernel
 from mpm.variables import (
     B_D,
@@ -28,6 +30,8 @@ from mpm.variables import (
     V_DLY,
     V_DSX,
     V_DSY,
+    V_GX,
+    V_GY,
     V_LX,
     V_LY,
     V_ML,
@@ -35,8 +39,9 @@ from mpm.variables import (
     V_P,
     V_SX,
     V_SY,
-    V_TL,
     V_TS,
+    V_WL,
+    V_WS,
 )
 
 FIXED_X, FIXED_Y = 1, 2
@@ -170,52 +175,129 @@ def solve_nodes(
 
 
 @kernel
-def remap_nodes(first, last, momenta, fixed, contact_of_node, normal, active, nodes, status):
-    """Nodal velocities from the updated point momenta (MUSL), under the constraints that acted in this step."""
+def solve_dry_nodes(
+    first, last, sums, dt, gravity, density_liquid, fixed, contact_of_node,
+    normal, active, friction, nodes, status, impulse,
+):  # fmt: skip
+    """`solve_nodes` for dry soil: one momentum equation a node; the water's columns are not touched."""
     for i in range(first, last):
+        ms = px = py = fx = fy = 0.0
+        for part in range(sums.shape[0]):
+            b = sums[part, i]
+            ms += b[B_MS]
+            px += b[B_PSX]
+            py += b[B_PSY]
+            fx += b[B_FX]
+            fy += b[B_FY]
         row = nodes[i]
-        if row[V_MS] <= 0.0:
+        row[V_MS] = ms
+        status[i] = 0
+        if ms <= 0.0:
+            row[V_MS] = 0.0
+            row[V_SX] = row[V_SY] = row[V_DSX] = row[V_DSY] = 0.0
             continue
-        sx = sy = lx = ly = 0.0
-        for part in range(momenta.shape[0]):
-            sx += momenta[part, i, 0]
-            sy += momenta[part, i, 1]
-            lx += momenta[part, i, 2]
-            ly += momenta[part, i, 3]
-        sx /= row[V_MS]
-        sy /= row[V_MS]
-        lx /= row[V_ML]
-        ly /= row[V_ML]
+        ux, uy = px / ms, py / ms
+        px += dt * fx
+        py += dt * (fy - ms * gravity)
         c = contact_of_node[i]
         if c >= 0 and active[c]:
             nx, ny = normal[c, 0], normal[c, 1]
-            if status[i] & SOLID_STICKS:
-                sx = sy = 0.0
-            else:
-                vn = nx * sx + ny * sy
-                if status[i] & SOLID_HELD or vn < 0.0:
-                    sx -= vn * nx
-                    sy -= vn * ny
-            vn = nx * lx + ny * ly
-            if status[i] & LIQUID_HELD or vn < 0.0:
-                lx -= vn * nx
-                ly -= vn * ny
+            pn, pt = nx * px + ny * py, ny * px - nx * py
+            if pn < 0.0:
+                reaction = -pn / dt
+                shear = -pt / dt
+                limit = friction[c] * reaction
+                pn = 0.0
+                status[i] = SOLID_HELD
+                if abs(shear) > limit:
+                    shear = limit if shear > 0.0 else -limit
+                    pt += dt * shear
+                else:
+                    pt = 0.0
+                    status[i] |= SOLID_STICKS
+                impulse[c, 0] += dt * reaction
+                impulse[c, 2] += dt * shear
+                impulse[c, 3] += dt * reaction * reaction
+            px, py = nx * pn + ny * pt, ny * pn - nx * pt
+        vx, vy = px / ms, py / ms
         if fixed[i] & FIXED_X:
-            sx = lx = 0.0
+            vx = 0.0
         if fixed[i] & FIXED_Y:
-            sy = ly = 0.0
-        row[V_SX], row[V_SY], row[V_LX], row[V_LY] = sx, sy, lx, ly
+            vy = 0.0
+        row[V_SX], row[V_SY] = vx, vy
+        row[V_DSX], row[V_DSY] = vx - ux, vy - uy
+
+
+@cache
+def remap_kernel(wet):
+    """Kernel `remap_nodes` for points with pore water or without."""
+
+    @kernel
+    def remap_nodes(first, last, momenta, fixed, contact_of_node, normal, active, nodes, status):
+        """Nodal velocities from the updated point momenta (MUSL), under the constraints that acted in this step."""
+        for i in range(first, last):
+            row = nodes[i]
+            if row[V_MS] <= 0.0:
+                continue
+            sx = sy = lx = ly = 0.0
+            for part in range(momenta.shape[0]):
+                sx += momenta[part, i, 0]
+                sy += momenta[part, i, 1]
+                if wet:
+                    lx += momenta[part, i, 2]
+                    ly += momenta[part, i, 3]
+            sx /= row[V_MS]
+            sy /= row[V_MS]
+            if wet:
+                lx /= row[V_ML]
+                ly /= row[V_ML]
+            c = contact_of_node[i]
+            if c >= 0 and active[c]:
+                nx, ny = normal[c, 0], normal[c, 1]
+                if status[i] & SOLID_STICKS:
+                    sx = sy = 0.0
+                else:
+                    vn = nx * sx + ny * sy
+                    if status[i] & SOLID_HELD or vn < 0.0:
+                        sx -= vn * nx
+                        sy -= vn * ny
+                if wet:
+                    vn = nx * lx + ny * ly
+                    if status[i] & LIQUID_HELD or vn < 0.0:
+                        lx -= vn * nx
+                        ly -= vn * ny
+            if fixed[i] & FIXED_X:
+                sx = lx = 0.0
+            if fixed[i] & FIXED_Y:
+                sy = ly = 0.0
+            row[V_SX], row[V_SY] = sx, sy
+            if wet:
+                row[V_LX], row[V_LY] = lx, ly
+
+    return remap_nodes
 
 
 @kernel
 def smooth_rates(first, last, sums, nodes):
-    """Nodal means of both divergences, weighted by material volume (Detournay & Dzik 2006)."""
+    """Nodal means of the divergences and of the gradient of the projected pressure (Detournay & Dzik 2006).
+
+    sums : (n_parts, n_nodes, 7) float64, of `element_rates`. A node without weight keeps what it had.
+    """
     for i in range(first, last):
-        weight = ts = tl = 0.0
+        volume = ts = wet = ws = wl = gx = gy = 0.0
         for part in range(sums.shape[0]):
-            weight += sums[part, i, 0]
-            ts += sums[part, i, 1]
-            tl += sums[part, i, 2]
-        if weight > 0.0:
-            nodes[i, V_TS] = ts / weight
-            nodes[i, V_TL] = tl / weight
+            row = sums[part, i]
+            volume += row[0]
+            ts += row[1]
+            wet += row[2]
+            ws += row[3]
+            wl += row[4]
+            gx += row[5]
+            gy += row[6]
+        if volume > 0.0:
+            nodes[i, V_TS] = ts / volume
+        if wet > 0.0:
+            nodes[i, V_WS] = ws / wet
+            nodes[i, V_WL] = wl / wet
+            nodes[i, V_GX] = gx / wet
+            nodes[i, V_GY] = gy / wet

@@ -1,11 +1,12 @@
 """Filling elements with points, and keeping points with the element that holds them."""
 
 import math
+from functools import cache
 
 import numpy as np
 
 from mpm.jit import kernel
-from mpm.transfer import map_point
+from mpm.transfer import map_kernel
 from mpm.variables import C_RETURNED, MASS, POINT_WIDTH, SXX, SYY, SZZ, X0, Y0, N, P, X, Y
 
 
@@ -122,14 +123,17 @@ def initial_stress(scene, depth):
 
     Notes
     -----
-    The soil is saturated throughout: above the water table its water hangs at zero pressure.
+    Without water the soil is dry. Else it is saturated throughout: above the table its water hangs at zero pressure.
     """
     g, water = scene.gravity, scene.water
+    water_density = water.density if water is not None else 0.0
     total = np.zeros_like(depth)
     tops = [s.top_depth for s in scene.soils] + [math.inf]
     for soil, top, bottom in zip(scene.soils, tops[:-1], tops[1:], strict=True):
-        weight = g * ((1 - soil.porosity) * soil.grain_density + soil.porosity * water.density)
+        weight = g * ((1 - soil.porosity) * soil.grain_density + soil.porosity * water_density)
         total += weight * np.clip(np.minimum(depth, bottom) - top, 0.0, None)
+    if water is None:
+        return total, np.zeros_like(depth)
     pressure = g * water.density * np.clip(depth - water.table_depth, 0.0, None)
     return total - pressure, pressure
 
@@ -236,88 +240,97 @@ def update_order(element_of_point, moved_point, moved_from, n_moved, start, orde
     return filled, write
 
 
-@kernel
-def relocate(
-    element_of_point, points, soil_of_point, soils, density_liquid, elements, geometry, neighbours, nodes, wave_speed,
-    volume, sums, clamps, moved_point, moved_from,
-):  # fmt: skip
-    """Find the new element of every point that left its own, walking over neighbours, and map it there.
+@cache
+def relocate_kernel(wet):
+    """Kernel `relocate` for points with pore water or without."""
+    map_point = map_kernel(wet)
 
-    A point that would cross the boundary of the mesh is put back on it (and counted); one that
-    crosses an outflow edge (neighbour -2) is taken out: element -1. The points that changed their
-    element and the elements that they left are written to `moved_point`, `moved_from` in ascending
-    order of points.
+    @kernel
+    def relocate(
+        element_of_point, points, soil_of_point, soils, density_liquid, elements, geometry, neighbours, nodes,
+        wave_speed, volume, sums, clamps, moved_point, moved_from,
+    ):  # fmt: skip
+        """Find the new element of every point that left its own, walking over neighbours, and map it there.
 
-    Returns
-    -------
-    n_moved, removed : int
-        Number of points that changed their element, and of points taken out.
-    limit, limit_speed : float
-        As of `update_points`, over the points relocated.
-    """
-    limit = np.inf
-    limit_speed = 0.0
-    removed = 0
-    n_moved = 0
-    for i in range(element_of_point.size):
-        if element_of_point[i] > -2:
-            continue
-        e = -2 - element_of_point[i]
-        left = e
-        for _ in range(10000):
-            g = geometry[e]
-            dx = points[i, X] - g[4]
-            dy = points[i, Y] - g[5]
-            n1 = g[0] * dx + g[1] * dy
-            n2 = g[2] * dx + g[3] * dy
-            n0 = 1.0 - n1 - n2
-            worst = 0
-            low = n0
-            if n1 < low:
-                worst, low = 1, n1
-            if n2 < low:
-                worst, low = 2, n2
-            if low >= 0.0:
-                break
-            following = neighbours[e, worst]
-            if following < 0:
-                # try to leave through the other violated edge first
-                other = -1
-                for k in range(3):
-                    value = n0 if k == 0 else (n1 if k == 1 else n2)
-                    if k != worst and value < 0.0 and neighbours[e, k] >= 0:
-                        other = neighbours[e, k]
-                if other >= 0:
-                    following = other
-            if following >= 0:
-                e = following
+        A point that would cross the boundary of the mesh is put back on it (and counted); one that
+        crosses an outflow edge (neighbour -2) is taken out: element -1. The points that changed their
+        element and the elements that they left are written to `moved_point`, `moved_from` in ascending
+        order of points.
+
+        Returns
+        -------
+        n_moved, removed : int
+            Number of points that changed their element, and of points taken out.
+        limit, limit_speed : float
+            As of `update_points`, over the points relocated.
+        """
+        limit = np.inf
+        limit_speed = 0.0
+        removed = 0
+        n_moved = 0
+        for i in range(element_of_point.size):
+            if element_of_point[i] > -2:
                 continue
-            if following == -2:
-                e = -1
-                removed += 1
+            e = -2 - element_of_point[i]
+            left = e
+            for _ in range(10000):
+                g = geometry[e]
+                dx = points[i, X] - g[4]
+                dy = points[i, Y] - g[5]
+                n1 = g[0] * dx + g[1] * dy
+                n2 = g[2] * dx + g[3] * dy
+                n0 = 1.0 - n1 - n2
+                worst = 0
+                low = n0
+                if n1 < low:
+                    worst, low = 1, n1
+                if n2 < low:
+                    worst, low = 2, n2
+                if low >= 0.0:
+                    break
+                following = neighbours[e, worst]
+                if following < 0:
+                    # try to leave through the other violated edge first
+                    other = -1
+                    for k in range(3):
+                        value = n0 if k == 0 else (n1 if k == 1 else n2)
+                        if k != worst and value < 0.0 and neighbours[e, k] >= 0:
+                            other = neighbours[e, k]
+                    if other >= 0:
+                        following = other
+                if following >= 0:
+                    e = following
+                    continue
+                if following == -2:
+                    e = -1
+                    removed += 1
+                    break
+                n0, n1, n2 = max(n0, 1e-9), max(n1, 1e-9), max(n2, 1e-9)
+                total = n0 + n1 + n2
+                n1 /= total
+                n2 /= total
+                det = g[0] * g[3] - g[1] * g[2]
+                points[i, X] = g[4] + (n1 * g[3] - n2 * g[1]) / det
+                points[i, Y] = g[5] + (n2 * g[0] - n1 * g[2]) / det
+                clamps[C_RETURNED] += 1
                 break
-            n0, n1, n2 = max(n0, 1e-9), max(n1, 1e-9), max(n2, 1e-9)
-            total = n0 + n1 + n2
-            n1 /= total
-            n2 /= total
-            det = g[0] * g[3] - g[1] * g[2]
-            points[i, X] = g[4] + (n1 * g[3] - n2 * g[1]) / det
-            points[i, Y] = g[5] + (n2 * g[0] - n1 * g[2]) / det
-            clamps[C_RETURNED] += 1
-            break
-        element_of_point[i] = e
-        if e != left:
-            moved_point[n_moved] = i
-            moved_from[n_moved] = left
-            n_moved += 1
-        if e >= 0:
-            added, fastest = map_point(
-                points[i], soils[soil_of_point[i]], density_liquid, elements[e], geometry[e], nodes, sums
-            )
-            volume[e] += added
-            fastest = np.sqrt(fastest)
-            local = geometry[e, 7] / (wave_speed + fastest)
-            if local < limit:
-                limit = local
-                limit_speed = fastest
-    return n_moved, removed, limit, limit_speed
+            element_of_point[i] = e
+            if e != left:
+                moved_point[n_moved] = i
+                moved_from[n_moved] = left
+                n_moved += 1
+            if e >= 0:
+                added, fastest = map_point(
+                    points[i], soils[soil_of_point[i]], density_liquid, elements[e], geometry[e], nodes, sums
+                )
+                volume[e, 0] += added
+                if points[i, P] > 0.0:
+                    volume[e, 1] += added
+                fastest = np.sqrt(fastest)
+                local = geometry[e, 7] / (wave_speed + fastest)
+                if local < limit:
+                    limit = local
+                    limit_speed = fastest
+        return n_moved, removed, limit, limit_speed
+
+    return relocate

@@ -63,7 +63,7 @@ class Box(Part):
 
 
 class Water(Part):
-    """Pore water; everything below the table is saturated, and so is what hangs above it."""
+    """Pore water; everything below the table is saturated, and so is what hangs above it. A dry scene has none."""
 
     table_depth: Length = Field(ge=0)
     density: Density = Field(gt=500, lt=2000)
@@ -85,7 +85,7 @@ class Soil(Part):
     porosity: float
     loose_porosity: float
     grain_density: Density = Field(gt=1000, lt=10000)
-    hydraulic_conductivity: Velocity
+    hydraulic_conductivity: Velocity | None = None
     k0: float = Field(gt=0, lt=5)
 
     @model_validator(mode="after")
@@ -100,7 +100,7 @@ class Soil(Part):
                 f"{who}: loose_porosity (above it grains do not touch) must lie between porosity "
                 f"{self.porosity:g} and 0.9, got {self.loose_porosity:g}"
             )
-        if not 0 < self.hydraulic_conductivity <= 10:
+        if self.hydraulic_conductivity is not None and not 0 < self.hydraulic_conductivity <= 10:
             raise ValueError(
                 f"{who}: hydraulic_conductivity must lie in (0, 10] m/s, got {self.hydraulic_conductivity:g}; "
                 "give the Darcy conductivity in m/s, sand about 1e-4"
@@ -179,11 +179,24 @@ class Discretisation(Part):
 
 
 class Numerics(Part):
-    """Numerical choices, none of which should decide the answer; `pressure_filter` 0 turns the filter off."""
+    """Numerical choices, none of which should decide the answer.
+
+    Parameters
+    ----------
+    courant : float
+        Time step over the critical one [-].
+    pic_rate : float
+        Rate at which point velocities are drawn to those of the grid [1/s]; 0 is pure FLIP. A share per
+        second, not per step: the viscosity that it adds falls with the square of the mesh size.
+    pressure_filter : float
+        Share of a point's pore pressure that is drawn in each step to a smooth projection [-]; 0 is off.
+    volumetric_smoothing : bool
+        Mean volumetric strain rates over the elements around a node.
+    """
 
     courant: float = Field(default=0.5, gt=0, le=1)
-    flip_fraction: float = Field(default=0.99, ge=0, le=1)
-    pressure_filter: float = Field(default=0.05, ge=0, le=1)
+    pic_rate: Annotated[float, in_unit("1/s")] = Field(default=10.0, ge=0)
+    pressure_filter: float = Field(default=0.2, ge=0, le=1)
     volumetric_smoothing: bool = True
     relaxation_tolerance: float = Field(default=1e-5, gt=0, lt=1)
     max_relaxation_steps: int = Field(default=20000, ge=1)
@@ -215,7 +228,7 @@ class Scene(Part):
     name: str = Field(min_length=1, max_length=80, pattern=r"^[\w.-]+$")
     gravity: Acceleration = Field(default=9.81, ge=0, le=100)
     box: Box
-    water: Water
+    water: Water | None = None
     soils: tuple[Soil, ...] = Field(min_length=1)
     tunnels: tuple[Tunnel, ...] = ()
     gate: Gate | None = None
@@ -234,7 +247,14 @@ class Scene(Part):
             raise ValueError(f"soils: top_depth must start at 0 and increase, got {tops}")
         if tops[-1] >= self.box.depth:
             raise ValueError(f"soils: top_depth {tops[-1]:g} m lies below the box of depth {self.box.depth:g} m")
-        if self.water.table_depth > 0 and self.water.table_depth >= self.box.depth:
+        if self.water is not None:
+            unknown = [soil.name for soil in self.soils if soil.hydraulic_conductivity is None]
+            if unknown:
+                raise ValueError(
+                    f"soil '{unknown[0]}': hydraulic_conductivity must be given where there is water, got none; give "
+                    "the Darcy conductivity in m/s, sand about 1e-4, or leave [water] out for a dry scene"
+                )
+        if self.water is not None and self.water.table_depth >= self.box.depth:
             raise ValueError(
                 f"water: table_depth {self.water.table_depth:g} m lies below the box of depth {self.box.depth:g} m"
             )

@@ -8,19 +8,22 @@ from types import SimpleNamespace
 import numpy as np
 
 from mpm import stages
-from mpm.contact import FIXED_X, FIXED_Y, remap_nodes, smooth_rates, solve_nodes
-from mpm.points import fill, initial_stress, relocate, sort_by_element, update_order
-from mpm.time_step import critical_time_step, fast_wave_speed
-from mpm.transfer import advance_points, element_rates, update_points
+from mpm.contact import FIXED_X, FIXED_Y, remap_kernel, smooth_rates, solve_dry_nodes, solve_nodes
+from mpm.points import fill, initial_stress, relocate_kernel, sort_by_element, update_order
+from mpm.time_step import critical_time_step, dry_wave_speed, fast_wave_speed
+from mpm.transfer import advance_kernel, rates_kernel, update_kernel
 from mpm.variables import (
     BUFFER_WIDTH,
     CLAMPS,
     MASS,
     MODEL_ELASTIC,
     MODEL_MOHR_COULOMB,
+    NODAL_MEANS,
     NODE_WIDTH,
     POINT_VARIABLES,
     RATE_WIDTH,
+    S_G,
+    S_LAMBDA,
     SOIL_WIDTH,
     V_P,
     VSX,
@@ -28,6 +31,7 @@ from mpm.variables import (
     X0,
     Y0,
     N,
+    P,
     X,
     Y,
 )
@@ -61,6 +65,7 @@ class Solver:
         self.points, self.element_of_point, self.soil_of_point = fill(mesh, scene)
         self.soils = soil_table(scene)
         self.parts = PARTS
+        self._choose_kernels()
         m, n = len(mesh.elements), len(mesh.nodes)
         self.geometry = element_geometry(mesh)
         self.neighbours = element_neighbours(mesh, outflow_nodes(scene, mesh))
@@ -74,11 +79,11 @@ class Solver:
         self.occupied = np.zeros(m, np.int32)
         self.sums = np.zeros((PARTS, n, BUFFER_WIDTH))
         self.momenta = np.zeros((PARTS, n, 4))
-        self.divergences = np.zeros((PARTS, n, 3))
+        self.nodal_means = np.zeros((PARTS, n, NODAL_MEANS))
         self.nodes = np.zeros((n, NODE_WIDTH))
         self.status = np.zeros(n, np.int8)
         self.rates = np.zeros((m, RATE_WIDTH))
-        self.volume = np.zeros(m)
+        self.volume = np.zeros((m, 2))
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
         self.threads = 1 if m < SMALLEST_PARALLEL else max(1, min(threads or cores, PARTS))
         self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
@@ -99,6 +104,20 @@ class Solver:
         self.gate_open = False
 
     # -- set-up ---------------------------------------------------------------------------------
+
+    def _choose_kernels(self):
+        """Kernels compiled for what the scene has, and nothing else."""
+        scene = self.scene
+        wet = scene.water is not None
+        plastic = any(soil.model == "mohr-coulomb" for soil in scene.soils)
+        self._solve_nodes = solve_nodes if wet else solve_dry_nodes
+        self._advance_points = advance_kernel(wet)
+        self._remap_nodes = remap_kernel(wet)
+        self._rates = rates_kernel(wet)
+        self._update = update_kernel(wet, plastic, scene.numerics.volumetric_smoothing)
+        self._relocate_points = relocate_kernel(wet)
+        self._water_density = scene.water.density if wet else 0.0
+        self._water_modulus = scene.water.bulk_modulus if wet else 0.0
 
     def _build_contact(self):
         mesh, scene = self.mesh, self.scene
@@ -205,15 +224,17 @@ class Solver:
         for k, soil in enumerate(self.scene.soils):
             mine = (self.soil_of_point == k) & (self.element_of_point >= 0)
             if mine.any():
-                speeds.append(
-                    fast_wave_speed(
-                        self.soils[k, 1] + 2 * self.soils[k, 2],
-                        self.scene.water.bulk_modulus,
-                        float(self.points[mine, N].min()),
-                        soil.grain_density,
-                        self.scene.water.density,
+                modulus = self.soils[k, S_LAMBDA] + 2 * self.soils[k, S_G]
+                porosity = self.points[mine, N]
+                if self.scene.water is None:
+                    loosest = min(float(porosity.max()), soil.loose_porosity)
+                    speeds.append(dry_wave_speed(modulus, loosest, soil.grain_density))
+                else:
+                    speeds.append(
+                        fast_wave_speed(
+                            modulus, self._water_modulus, float(porosity.min()), soil.grain_density, self._water_density
+                        )
                     )
-                )
         self.wave_speed = max(speeds)
 
     # -- threads --------------------------------------------------------------------------------
@@ -264,17 +285,28 @@ class Solver:
 
     # -- stages ---------------------------------------------------------------------------------
 
+    def _element_rates(self):
+        self.over_elements(
+            self._rates, self.occupied, self.mesh.elements, self.geometry, self.nodes, self.volume, self.rates,
+            per_range=(self.nodal_means,),
+        )  # fmt: skip
+        self.over_nodes(smooth_rates, self.nodal_means, self.nodes)
+
     def map_points(self):
         """Sum the points at the nodes without advancing anything; sets the limits of the time step."""
+        inside = self.element_of_point >= 0
+        element, volume = self.element_of_point[inside], self._volumes()[inside]
+        self.volume[:, 0] = np.bincount(element, volume, len(self.volume))
+        self.volume[:, 1] = np.bincount(element, volume * (self.points[inside, P] > 0), len(self.volume))
+        self._element_rates()
         self._limits = [o[3:] for o in self._update_points(0.0, False)]
         self._mapped = True
 
     def _update_points(self, dt, advance):
-        water, numerics = self.scene.water, self.scene.numerics
         return self.over_elements(
-            update_points, self.occupied, self.start, self.order, self.points, self.soil_of_point, self.soils,
-            water.density, water.bulk_modulus, self.mesh.elements, self.geometry, self.nodes, self.rates, self.volume,
-            dt, advance, numerics.volumetric_smoothing, self.wave_speed, self.element_of_point,
+            self._update, self.occupied, self.start, self.order, self.points, self.soil_of_point, self.soils,
+            self._water_density, self._water_modulus, self.mesh.elements, self.geometry, self.nodes, self.rates,
+            self.volume, dt, advance, self.wave_speed, self.element_of_point,
             per_range=(self.clamps, self.sums),
         )  # fmt: skip
 
@@ -301,7 +333,7 @@ class Solver:
 
     def step(self, dt_max=math.inf):
         """Advance by one time step, not longer than dt_max [s]; returns (dt, name of its limit)."""
-        s, numerics, water = self.scene, self.scene.numerics, self.scene.water
+        numerics, density = self.scene.numerics, self._water_density
         layout = (self.occupied, self.start, self.order, self.points, self.soil_of_point, self.soils)
         grid = (self.mesh.elements, self.geometry, self.nodes)
         wall = (self.fixed, self.contact_of_node, self.normal, self.active)
@@ -312,17 +344,15 @@ class Solver:
         if dt > dt_max:
             dt, limit = dt_max, "output"
         self.over_nodes(
-            solve_nodes, self.sums, dt, s.gravity, water.density, *wall, self.friction, self.nodes,
+            self._solve_nodes, self.sums, dt, self.scene.gravity, density, *wall, self.friction, self.nodes,
             self.status, self.impulse,
         )  # fmt: skip
         self.over_elements(
-            advance_points, *layout, water.density, *grid, dt, numerics.flip_fraction, numerics.pressure_filter,
-            per_range=(self.momenta,),
+            self._advance_points, *layout, density, *grid, dt, math.exp(-numerics.pic_rate * dt),
+            numerics.pressure_filter, per_range=(self.momenta,),
         )  # fmt: skip
-        self.over_nodes(remap_nodes, self.momenta, *wall, self.nodes, self.status)
-        self.over_elements(element_rates, self.occupied, *grid, self.volume, self.rates, per_range=(self.divergences,))
-        if numerics.volumetric_smoothing:
-            self.over_nodes(smooth_rates, self.divergences, self.nodes)
+        self.over_nodes(self._remap_nodes, self.momenta, *wall, self.nodes, self.status)
+        self._element_rates()
         outcome = self._update_points(dt, True)
         self._check(outcome)
         self._limits = [o[3:] for o in outcome]
@@ -338,8 +368,8 @@ class Solver:
         return dt, limit
 
     def _relocate(self):
-        n_moved, removed, *limit = relocate(
-            self.element_of_point, self.points, self.soil_of_point, self.soils, self.scene.water.density,
+        n_moved, removed, *limit = self._relocate_points(
+            self.element_of_point, self.points, self.soil_of_point, self.soils, self._water_density,
             self.mesh.elements, self.geometry, self.neighbours, self.nodes, self.wave_speed, self.volume, self.sums[0],
             self.clamps[0], *self._moved,
         )  # fmt: skip
@@ -425,7 +455,7 @@ class Solver:
 
 
 def soil_table(scene):
-    """Parameters of the soils as the kernels read them: (n_soils, 12) float64."""
+    """Parameters of the soils as the kernels read them: (n_soils, 13) float64."""
     table = np.zeros((len(scene.soils), SOIL_WIDTH))
     for row, soil in zip(table, scene.soils, strict=True):
         shear = soil.youngs_modulus / (2 * (1 + soil.poissons_ratio))
@@ -443,7 +473,8 @@ def soil_table(scene):
             apex,
             min(soil.tensile_strength, apex),
             soil.loose_porosity,
-            scene.gravity / soil.hydraulic_conductivity,
+            soil.porosity,
+            scene.gravity / soil.hydraulic_conductivity if scene.water is not None else 0.0,
             soil.grain_density,
         )
     return table

@@ -27,6 +27,11 @@ def fast_wave_speed(constrained_modulus, bulk_modulus_liquid, porosity, density_
     return float(np.sqrt(np.max(np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real)))
 
 
+def dry_wave_speed(constrained_modulus, porosity, density_grains):
+    """Speed of the compression wave of a dry soil [m/s]; the looser, the lighter and the faster."""
+    return float(np.sqrt(constrained_modulus / ((1 - porosity) * density_grains)))
+
+
 def critical_time_step(limits, wave_speed, courant):
     """Largest stable time step, from the limits of the parts of the mesh.
 

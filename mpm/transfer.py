@@ -5,6 +5,8 @@ elements own, so ranges may run in any number of threads with the same bits. Sha
 those of the linear triangle; `geometry` rows hold (g1x, g1y, g2x, g2y, x0, y0, area, height).
 """
 
+from functools import cache
+
 import numpy as np
 
 from mpm.jit import kernel
@@ -47,6 +49,7 @@ from mpm.variables import (
     S_LAMBDA,
     S_LOOSE,
     S_MODEL,
+    S_N0,
     S_RHO_S,
     S_SIN,
     S_SIN_DIL,
@@ -59,13 +62,16 @@ from mpm.variables import (
     V_DLY,
     V_DSX,
     V_DSY,
+    V_GX,
+    V_GY,
     V_LX,
     V_LY,
     V_P,
     V_SX,
     V_SY,
-    V_TL,
     V_TS,
+    V_WL,
+    V_WS,
     VLX,
     VLY,
     VSX,
@@ -76,379 +82,463 @@ from mpm.variables import (
     Y,
 )
 
-
-@kernel
-def advance_points(
-    first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, elements, geometry, nodes,
-    dt, flip_fraction, pressure_filter, sums,
-):  # fmt: skip
-    """Advance point velocities and positions from the nodes and map the new momenta back (MUSL).
-
-    Velocities take `flip_fraction` of the FLIP and the rest of the PIC update; positions move with
-    the solid. A positive pore pressure is drawn by `pressure_filter` towards its projection on
-    continuous linear functions: what such a function can represent is left as it is.
-    `sums` (n_nodes, 4) receives the new momenta of both phases [kg m/s per metre].
-
-    Source: Sulsky, Zhou & Schreyer (1995) for MUSL; Zhu & Bridson (2005) for the PIC/FLIP blend.
-    """
-    sums[:] = 0.0
-    for k in range(first, last):
-        e = occupied[k]
-        g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
-        x0, y0 = geometry[e, 4], geometry[e, 5]
-        a = nodes[elements[e, 0]]
-        b = nodes[elements[e, 1]]
-        c = nodes[elements[e, 2]]
-        sx0 = sx1 = sx2 = sy0 = sy1 = sy2 = lx0 = lx1 = lx2 = ly0 = ly1 = ly2 = 0.0
-        pic = 1.0 - flip_fraction
-        for j in range(start[e], start[e + 1]):
-            i = order[j]
-            row = points[i]
-            m = row[MASS]
-            w = m / (soils[soil_of_point[i], S_RHO_S] * (1.0 - row[N])) * density_liquid
-            dx = row[X] - x0
-            dy = row[Y] - y0
-            n1 = g1x * dx + g1y * dy
-            n2 = g2x * dx + g2y * dy
-            n0 = 1.0 - n1 - n2
-            gx = n0 * a[V_SX] + n1 * b[V_SX] + n2 * c[V_SX]
-            gy = n0 * a[V_SY] + n1 * b[V_SY] + n2 * c[V_SY]
-            hx = n0 * a[V_LX] + n1 * b[V_LX] + n2 * c[V_LX]
-            hy = n0 * a[V_LY] + n1 * b[V_LY] + n2 * c[V_LY]
-            vx = flip_fraction * (row[VSX] + n0 * a[V_DSX] + n1 * b[V_DSX] + n2 * c[V_DSX]) + pic * gx
-            vy = flip_fraction * (row[VSY] + n0 * a[V_DSY] + n1 * b[V_DSY] + n2 * c[V_DSY]) + pic * gy
-            ux = flip_fraction * (row[VLX] + n0 * a[V_DLX] + n1 * b[V_DLX] + n2 * c[V_DLX]) + pic * hx
-            uy = flip_fraction * (row[VLY] + n0 * a[V_DLY] + n1 * b[V_DLY] + n2 * c[V_DLY]) + pic * hy
-            row[VSX], row[VSY], row[VLX], row[VLY] = vx, vy, ux, uy
-            row[X] += dt * gx
-            row[Y] += dt * gy
-            if row[P] > 0.0:
-                smooth = max(n0 * a[V_P] + n1 * b[V_P] + n2 * c[V_P], 0.0)
-                row[P] += pressure_filter * (smooth - row[P])
-            sx0 += n0 * m * vx
-            sx1 += n1 * m * vx
-            sx2 += n2 * m * vx
-            sy0 += n0 * m * vy
-            sy1 += n1 * m * vy
-            sy2 += n2 * m * vy
-            lx0 += n0 * w * ux
-            lx1 += n1 * w * ux
-            lx2 += n2 * w * ux
-            ly0 += n0 * w * uy
-            ly1 += n1 * w * uy
-            ly2 += n2 * w * uy
-        d = sums[elements[e, 0]]
-        d[0] += sx0
-        d[1] += sy0
-        d[2] += lx0
-        d[3] += ly0
-        d = sums[elements[e, 1]]
-        d[0] += sx1
-        d[1] += sy1
-        d[2] += lx1
-        d[3] += ly1
-        d = sums[elements[e, 2]]
-        d[0] += sx2
-        d[1] += sy2
-        d[2] += lx2
-        d[3] += ly2
+# Share of the squared altitude: the shortest wave of the mesh loses most of its amplitude in a step, none overshoots.
+PROJECTION_SMOOTHING = 0.1
 
 
-@kernel
-def element_rates(first, last, occupied, elements, geometry, nodes, volume, rates, sums):
-    """Strain rates, spin and divergences of the remapped velocities, constant in an element [1/s].
+@cache
+def advance_kernel(wet):
+    """Kernel `advance_points` for points with pore water or without."""
 
-    `sums` (n_nodes, 3) receives material volume and volume times both divergences, for their nodal
-    means (Detournay & Dzik 2006).
-    """
-    sums[:] = 0.0
-    for k in range(first, last):
-        e = occupied[k]
-        g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
-        a = nodes[elements[e, 0]]
-        b = nodes[elements[e, 1]]
-        c = nodes[elements[e, 2]]
-        ux1, ux2 = b[V_SX] - a[V_SX], c[V_SX] - a[V_SX]
-        uy1, uy2 = b[V_SY] - a[V_SY], c[V_SY] - a[V_SY]
-        xx = g1x * ux1 + g2x * ux2
-        yy = g1y * uy1 + g2y * uy2
-        xy = g1y * ux1 + g2y * ux2
-        yx = g1x * uy1 + g2x * uy2
-        r = rates[e]
-        r[R_XX], r[R_YY], r[R_XY], r[R_W] = xx, yy, 0.5 * (xy + yx), 0.5 * (yx - xy)
-        r[R_DS] = xx + yy
-        r[R_DL] = (
-            g1x * (b[V_LX] - a[V_LX]) + g2x * (c[V_LX] - a[V_LX])
-            + g1y * (b[V_LY] - a[V_LY]) + g2y * (c[V_LY] - a[V_LY])
-        )  # fmt: skip
-        v = volume[e]
-        for corner in range(3):
-            d = sums[elements[e, corner]]
-            d[0] += v
-            d[1] += v * r[R_DS]
-            d[2] += v * r[R_DL]
+    @kernel
+    def advance_points(
+        first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, elements, geometry, nodes,
+        dt, flip_fraction, pressure_filter, sums,
+    ):  # fmt: skip
+        """Advance point velocities and positions from the nodes and map the new momenta back (MUSL).
+
+        Velocities take `flip_fraction` of the FLIP and the rest of the PIC update; positions move with
+        the solid. A positive pore pressure is drawn by `pressure_filter` towards its projection on
+        continuous linear functions: what such a function can represent is left as it is.
+        `sums` (n_nodes, 4) receives the new momenta of both phases [kg m/s per metre].
+
+        Source: Sulsky, Zhou & Schreyer (1995) for MUSL; Zhu & Bridson (2005) for the PIC/FLIP blend.
+        """
+        sums[:] = 0.0
+        for k in range(first, last):
+            e = occupied[k]
+            g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
+            x0, y0 = geometry[e, 4], geometry[e, 5]
+            a = nodes[elements[e, 0]]
+            b = nodes[elements[e, 1]]
+            c = nodes[elements[e, 2]]
+            sx0 = sx1 = sx2 = sy0 = sy1 = sy2 = lx0 = lx1 = lx2 = ly0 = ly1 = ly2 = 0.0
+            pic = 1.0 - flip_fraction
+            for j in range(start[e], start[e + 1]):
+                i = order[j]
+                row = points[i]
+                m = row[MASS]
+                dx = row[X] - x0
+                dy = row[Y] - y0
+                n1 = g1x * dx + g1y * dy
+                n2 = g2x * dx + g2y * dy
+                n0 = 1.0 - n1 - n2
+                gx = n0 * a[V_SX] + n1 * b[V_SX] + n2 * c[V_SX]
+                gy = n0 * a[V_SY] + n1 * b[V_SY] + n2 * c[V_SY]
+                vx = flip_fraction * (row[VSX] + n0 * a[V_DSX] + n1 * b[V_DSX] + n2 * c[V_DSX]) + pic * gx
+                vy = flip_fraction * (row[VSY] + n0 * a[V_DSY] + n1 * b[V_DSY] + n2 * c[V_DSY]) + pic * gy
+                row[VSX], row[VSY] = vx, vy
+                row[X] += dt * gx
+                row[Y] += dt * gy
+                sx0 += n0 * m * vx
+                sx1 += n1 * m * vx
+                sx2 += n2 * m * vx
+                sy0 += n0 * m * vy
+                sy1 += n1 * m * vy
+                sy2 += n2 * m * vy
+                if wet:
+                    w = m / (soils[soil_of_point[i], S_RHO_S] * (1.0 - row[N])) * density_liquid
+                    hx = n0 * a[V_LX] + n1 * b[V_LX] + n2 * c[V_LX]
+                    hy = n0 * a[V_LY] + n1 * b[V_LY] + n2 * c[V_LY]
+                    ux = flip_fraction * (row[VLX] + n0 * a[V_DLX] + n1 * b[V_DLX] + n2 * c[V_DLX]) + pic * hx
+                    uy = flip_fraction * (row[VLY] + n0 * a[V_DLY] + n1 * b[V_DLY] + n2 * c[V_DLY]) + pic * hy
+                    row[VLX], row[VLY] = ux, uy
+                    if row[P] > 0.0:
+                        smooth = max(n0 * a[V_P] + n1 * b[V_P] + n2 * c[V_P], 0.0)
+                        row[P] += pressure_filter * (smooth - row[P])
+                    lx0 += n0 * w * ux
+                    lx1 += n1 * w * ux
+                    lx2 += n2 * w * ux
+                    ly0 += n0 * w * uy
+                    ly1 += n1 * w * uy
+                    ly2 += n2 * w * uy
+            d = sums[elements[e, 0]]
+            d[0] += sx0
+            d[1] += sy0
+            if wet:
+                d[2] += lx0
+                d[3] += ly0
+            d = sums[elements[e, 1]]
+            d[0] += sx1
+            d[1] += sy1
+            if wet:
+                d[2] += lx1
+                d[3] += ly1
+            d = sums[elements[e, 2]]
+            d[0] += sx2
+            d[1] += sy2
+            if wet:
+                d[2] += lx2
+                d[3] += ly2
+
+    return advance_points
 
 
-@kernel
-def update_points(
-    first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, bulk_liquid, elements,
-    geometry, nodes, rates, volume, dt, advance, smoothing, wave_speed, element_of_point, clamps, sums,
-):  # fmt: skip
-    """Advance stress, pore pressure and porosity of the points of a range of elements, and map them to the nodes.
+@cache
+def rates_kernel(wet):
+    """Kernel `element_rates` for points with pore water or without."""
 
-    One pass does both, since passes over the points are what a step costs. `advance` False maps only.
-    Points that left their element are not mapped; `relocate` does that.
+    @kernel
+    def element_rates(first, last, occupied, elements, geometry, nodes, volume, rates, sums):
+        """Strain rates, spin and divergences of the remapped velocities, constant in an element [1/s].
 
-    Jaumann rate of effective stress; mass balance of the mixture for the pore pressure,
-    dp/dt = -(K_w/n) [(1 - n) div v_s + n div v_l] (Jassim et al. 2013, opposite sign of p).
-    A negative pore pressure is a memory of missing volume and carries nothing. Above the loose
-    porosity grains do not touch: no effective stress; and while the element is not full, closing
-    the air between suspended lumps builds neither stress nor pressure.
+        volume : (n_elements, 2) float64, of `update_points`.
+        sums : (n_nodes, 7) float64
+            Written: volume and volume times the divergence of the grains; volume under pore pressure, and
+            this times both divergences and times the gradient of the projected pore pressure.
+        """
+        sums[:] = 0.0
+        for k in range(first, last):
+            e = occupied[k]
+            g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
+            a = nodes[elements[e, 0]]
+            b = nodes[elements[e, 1]]
+            c = nodes[elements[e, 2]]
+            ux1, ux2 = b[V_SX] - a[V_SX], c[V_SX] - a[V_SX]
+            uy1, uy2 = b[V_SY] - a[V_SY], c[V_SY] - a[V_SY]
+            xx = g1x * ux1 + g2x * ux2
+            yy = g1y * uy1 + g2y * uy2
+            xy = g1y * ux1 + g2y * ux2
+            yx = g1x * uy1 + g2x * uy2
+            r = rates[e]
+            r[R_XX], r[R_YY], r[R_XY], r[R_W] = xx, yy, 0.5 * (xy + yx), 0.5 * (yx - xy)
+            r[R_DS] = xx + yy
+            v = volume[e, 0]
+            for corner in range(3):
+                d = sums[elements[e, corner]]
+                d[0] += v
+                d[1] += v * r[R_DS]
+            if wet:
+                r[R_DL] = (
+                    g1x * (b[V_LX] - a[V_LX]) + g2x * (c[V_LX] - a[V_LX])
+                    + g1y * (b[V_LY] - a[V_LY]) + g2y * (c[V_LY] - a[V_LY])
+                )  # fmt: skip
+                pressed = volume[e, 1]
+                p1, p2 = b[V_P] - a[V_P], c[V_P] - a[V_P]
+                px, py = pressed * (g1x * p1 + g2x * p2), pressed * (g1y * p1 + g2y * p2)
+                for corner in range(3):
+                    d = sums[elements[e, corner]]
+                    d[2] += pressed
+                    d[3] += pressed * r[R_DS]
+                    d[4] += pressed * r[R_DL]
+                    d[5] += px
+                    d[6] += py
 
-    Parameters
-    ----------
-    rates, volume : (n_elements, 6), (n_elements,) float64
-        Strain rates [1/s]; material volume [m2], read of the last and written for the next step.
-    element_of_point : (n_points,) int32
-        Written: -2 - element for a point that left its element.
-    sums : (n_nodes, 13) float64
-        Written: masses, momenta, drag and forces that these elements add to every node.
+    return element_rates
 
-    Returns
-    -------
-    moved, bad, suspended : int
-        Number of points that left their element, first point with a non-finite state or -1, and
-        number of suspended points.
-    limit, limit_speed : float
-        Smallest altitude / (wave speed + point speed) [s] and the point speed there [m/s].
-    """
-    sums[:] = 0.0
-    limit = np.inf
-    limit_speed = 0.0
-    moved = 0
-    n_suspended = n_cavitated = n_floor = n_ceiling = n_tension = 0
-    bad = -1
-    third = 1.0 / 3.0
-    for k in range(first, last):
-        e = occupied[k]
-        g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
-        x0, y0 = geometry[e, 4], geometry[e, 5]
-        r = rates[e]
-        i0, i1, i2 = elements[e, 0], elements[e, 1], elements[e, 2]
-        p0, p1, p2 = nodes[i0, V_P], nodes[i1, V_P], nodes[i2, V_P]
-        ms0 = ms1 = ms2 = ml0 = ml1 = ml2 = mn0 = mn1 = mn2 = d0 = d1 = d2 = q0 = q1 = q2 = 0.0
-        sx0 = sx1 = sx2 = sy0 = sy1 = sy2 = lx0 = lx1 = lx2 = ly0 = ly1 = ly2 = 0.0
-        fxx = fxy = fyy = fp = total = fastest = 0.0
-        if smoothing:
-            ts = third * (nodes[i0, V_TS] + nodes[i1, V_TS] + nodes[i2, V_TS])
-            tl = third * (nodes[i0, V_TL] + nodes[i1, V_TL] + nodes[i2, V_TL])
-        else:
-            ts, tl = r[R_DS], r[R_DL]
-        correction = 0.5 * (ts - r[R_DS])
-        exx = dt * (r[R_XX] + correction)
-        eyy = dt * (r[R_YY] + correction)
-        exy = dt * r[R_XY]
-        spin = dt * r[R_W]
-        ts *= dt
-        tl *= dt
-        mean = ts * third
-        equivalent = np.sqrt(2.0 * third * ((exx - mean) ** 2 + (eyy - mean) ** 2 + mean * mean + 2.0 * exy * exy))
-        shrink = 1.0 / (1.0 + ts)
-        full = volume[e] >= geometry[e, 6]
-        for j in range(start[e], start[e + 1]):
-            i = order[j]
-            row = points[i]
-            s = soils[soil_of_point[i]]
-            if advance:
-                n = row[N]
-                p = row[P]
-                loose = n >= s[S_LOOSE]
-                row[EQ] += equivalent
-                if loose and p <= 0.0 and not full:
-                    # lumps with air between them: shape changes, neither grains nor water are squeezed
-                    row[SXX] = row[SYY] = row[SZZ] = row[SXY] = 0.0
-                    row[P] = 0.0
-                    n_suspended += 1
-                else:
-                    p -= bulk_liquid / n * ((1.0 - n) * ts + n * tl)
-                    row[P] = p
-                    if p < 0.0:
-                        n_cavitated += 1
-                    if not (loose and p <= 0.0 and ts > 0.0):
-                        n = 1.0 - (1.0 - n) * shrink
-                        if n < POROSITY_FLOOR:
-                            n = POROSITY_FLOOR
-                            n_floor += 1
-                        elif n > POROSITY_CEILING:
-                            n = POROSITY_CEILING
-                            n_ceiling += 1
-                        row[N] = n
-                    if n >= s[S_LOOSE]:
+
+@cache
+def update_kernel(wet, plastic, smoothing):
+    """Kernel `update_points` for what the scene has: pore water, plastic soils, smoothed volume changes."""
+
+    @kernel
+    def update_points(
+        first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, bulk_liquid, elements,
+        geometry, nodes, rates, volume, dt, advance, wave_speed, element_of_point, clamps, sums,
+    ):  # fmt: skip
+        """Advance stress, pore pressure and porosity of the points of a range of elements, and map them to the nodes.
+
+        One pass does both, since passes over the points are what a step costs. `advance` False maps only.
+        Points that left their element are not mapped; `relocate` does that.
+
+        Jaumann rate of effective stress; mass balance of the mixture for the pore pressure,
+        dp/dt = -(K_w/n) [(1 - n) div v_s + n div v_l] (Jassim et al. 2013, opposite sign of p).
+        A negative pore pressure is a memory of missing volume and carries nothing. Above the loose
+        porosity grains do not touch: no effective stress; and while the element is not full, closing
+        the air between suspended lumps builds neither stress nor pressure.
+
+        Parameters
+        ----------
+        rates : (n_elements, 6) float64
+            Strain rates [1/s].
+        volume : (n_elements, 2) float64
+            Material volume, and that of points under pore pressure [m2]; read of the last and written for the
+            next step.
+        element_of_point : (n_points,) int32
+            Written: -2 - element for a point that left its element.
+        sums : (n_nodes, 13) float64
+            Written: masses, momenta, drag and forces that these elements add to every node.
+
+        Returns
+        -------
+        moved, bad, suspended : int
+            Number of points that left their element, first point with a non-finite state or -1, and
+            number of suspended points.
+        limit, limit_speed : float
+            Smallest altitude / (wave speed + point speed) [s] and the point speed there [m/s].
+        """
+        sums[:] = 0.0
+        limit = np.inf
+        limit_speed = 0.0
+        moved = 0
+        n_suspended = n_cavitated = n_floor = n_ceiling = n_tension = 0
+        bad = -1
+        third = 1.0 / 3.0
+        for k in range(first, last):
+            e = occupied[k]
+            g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
+            x0, y0 = geometry[e, 4], geometry[e, 5]
+            r = rates[e]
+            i0, i1, i2 = elements[e, 0], elements[e, 1], elements[e, 2]
+            ms0 = ms1 = ms2 = ml0 = ml1 = ml2 = mn0 = mn1 = mn2 = d0 = d1 = d2 = q0 = q1 = q2 = 0.0
+            sx0 = sx1 = sx2 = sy0 = sy1 = sy2 = lx0 = lx1 = lx2 = ly0 = ly1 = ly2 = 0.0
+            fxx = fxy = fyy = fp = total = pressed = fastest = 0.0
+            p0 = p1 = p2 = px = py = 0.0
+            own_s = dt * r[R_DS]
+            ts = r[R_DS]
+            if smoothing:
+                ts = third * (nodes[i0, V_TS] + nodes[i1, V_TS] + nodes[i2, V_TS])
+            if wet:
+                p0, p1, p2 = nodes[i0, V_P], nodes[i1, V_P], nodes[i2, V_P]
+                # gradient of the projected pressure, less its nodal mean: zero for a linear pressure
+                px = g1x * (p1 - p0) + g2x * (p2 - p0) - third * (nodes[i0, V_GX] + nodes[i1, V_GX] + nodes[i2, V_GX])
+                py = g1y * (p1 - p0) + g2y * (p2 - p0) - third * (nodes[i0, V_GY] + nodes[i1, V_GY] + nodes[i2, V_GY])
+                own_l = dt * r[R_DL]
+                wet_s, wet_l = own_s, own_l
+                if smoothing and volume[e, 1] > 0.0:
+                    wet_s = dt * third * (nodes[i0, V_WS] + nodes[i1, V_WS] + nodes[i2, V_WS])
+                    wet_l = dt * third * (nodes[i0, V_WL] + nodes[i1, V_WL] + nodes[i2, V_WL])
+            correction = 0.5 * (ts - r[R_DS])
+            exx = dt * (r[R_XX] + correction)
+            eyy = dt * (r[R_YY] + correction)
+            exy = dt * r[R_XY]
+            spin = dt * r[R_W]
+            ts *= dt
+            mean = ts * third
+            equivalent = np.sqrt(2.0 * third * ((exx - mean) ** 2 + (eyy - mean) ** 2 + mean * mean + 2.0 * exy * exy))
+            full = volume[e, 0] >= geometry[e, 6]
+            for j in range(start[e], start[e + 1]):
+                i = order[j]
+                row = points[i]
+                s = soils[soil_of_point[i]]
+                if advance:
+                    n = row[N]
+                    p = row[P]
+                    loose = n >= s[S_LOOSE]
+                    row[EQ] += equivalent
+                    es = own_s
+                    if wet and p > 0.0:
+                        es = wet_s
+                    if loose and p <= 0.0 and not full:
+                        # lumps with air between them: shape changes, neither grains nor water are squeezed
                         row[SXX] = row[SYY] = row[SZZ] = row[SXY] = 0.0
+                        row[P] = 0.0
                         n_suspended += 1
                     else:
-                        lam, shear = s[S_LAMBDA], s[S_G]
-                        sxx, syy, sxy = row[SXX], row[SYY], row[SXY]
-                        turn = 2.0 * spin * sxy
-                        txx = sxx - turn + lam * ts + 2.0 * shear * exx
-                        tyy = syy + turn + lam * ts + 2.0 * shear * eyy
-                        txy = sxy + spin * (sxx - syy) + 2.0 * shear * exy
-                        tzz = row[SZZ] + lam * ts
-                        if s[S_MODEL] != MODEL_ELASTIC:
-                            txx, tyy, tzz, txy, cut = mohr_coulomb(
-                                txx, tyy, tzz, txy, shear, s[S_K], s[S_C_COS], s[S_SIN], s[S_SIN_DIL], s[S_APEX],
-                                s[S_TENSION],
-                            )  # fmt: skip
-                            if cut > 0.0:
-                                n_tension += 1
-                        row[SXX], row[SYY], row[SZZ], row[SXY] = txx, tyy, tzz, txy
-                if bad < 0 and not np.isfinite(row[SXX] + row[P] + row[VSX] + row[VSY] + row[VLX] + row[VLY] + row[N]):
-                    bad = i
-            dx = row[X] - x0
-            dy = row[Y] - y0
-            n1 = g1x * dx + g1y * dy
-            n2 = g2x * dx + g2y * dy
-            if n1 < 0.0 or n2 < 0.0 or n1 + n2 > 1.0:
-                element_of_point[i] = -2 - e  # left: to be searched from e
-                moved += 1
-                continue
-            m = row[MASS]
-            n = row[N]
-            v = m / (s[S_RHO_S] * (1.0 - n))
-            n0 = 1.0 - n1 - n2
-            ms0 += n0 * m
-            ms1 += n1 * m
-            ms2 += n2 * m
-            w = v * density_liquid
-            w0, w1, w2 = n0 * w, n1 * w, n2 * w
-            ml0 += w0
-            ml1 += w1
-            ml2 += w2
-            mn0 += n * w0
-            mn1 += n * w1
-            mn2 += n * w2
-            drag = n * s[S_DRAG]
-            d0 += drag * w0
-            d1 += drag * w1
-            d2 += drag * w2
-            vx, vy = row[VSX], row[VSY]
-            sx0 += n0 * m * vx
-            sx1 += n1 * m * vx
-            sx2 += n2 * m * vx
-            sy0 += n0 * m * vy
-            sy1 += n1 * m * vy
-            sy2 += n2 * m * vy
-            ux, uy = row[VLX], row[VLY]
-            lx0 += w0 * ux
-            lx1 += w1 * ux
-            lx2 += w2 * ux
-            ly0 += w0 * uy
-            ly1 += w1 * uy
-            ly2 += w2 * uy
-            fastest = max(fastest, vx * vx + vy * vy, ux * ux + uy * uy)
-            p = max(row[P], 0.0)
-            r = v * (p - (n0 * p0 + n1 * p1 + n2 * p2))
-            q0 += n0 * r
-            q1 += n1 * r
-            q2 += n2 * r
-            fxx += v * (row[SXX] - p)
-            fyy += v * (row[SYY] - p)
-            fxy += v * row[SXY]
-            fp += v * p
-            total += v
-        volume[e] = total
-        fastest = np.sqrt(fastest)
-        local = geometry[e, 7] / (wave_speed + fastest)
-        if local < limit:
-            limit = local
-            limit_speed = fastest
-        g0x, g0y = -g1x - g2x, -g1y - g2y
-        b = sums[i0]
-        b[B_MS] += ms0
-        b[B_ML] += ml0
-        b[B_MN] += mn0
-        b[B_D] += d0
-        b[B_Q] += q0
-        b[B_PSX] += sx0
-        b[B_PSY] += sy0
-        b[B_PLX] += lx0
-        b[B_PLY] += ly0
-        b[B_FX] -= g0x * fxx + g0y * fxy
-        b[B_FY] -= g0x * fxy + g0y * fyy
-        b[B_FLX] += g0x * fp
-        b[B_FLY] += g0y * fp
-        b = sums[i1]
-        b[B_MS] += ms1
-        b[B_ML] += ml1
-        b[B_MN] += mn1
-        b[B_D] += d1
-        b[B_Q] += q1
-        b[B_PSX] += sx1
-        b[B_PSY] += sy1
-        b[B_PLX] += lx1
-        b[B_PLY] += ly1
-        b[B_FX] -= g1x * fxx + g1y * fxy
-        b[B_FY] -= g1x * fxy + g1y * fyy
-        b[B_FLX] += g1x * fp
-        b[B_FLY] += g1y * fp
-        b = sums[i2]
-        b[B_MS] += ms2
-        b[B_ML] += ml2
-        b[B_MN] += mn2
-        b[B_D] += d2
-        b[B_Q] += q2
-        b[B_PSX] += sx2
-        b[B_PSY] += sy2
-        b[B_PLX] += lx2
-        b[B_PLY] += ly2
-        b[B_FX] -= g2x * fxx + g2y * fxy
-        b[B_FY] -= g2x * fxy + g2y * fyy
-        b[B_FLX] += g2x * fp
-        b[B_FLY] += g2y * fp
-    clamps[C_SUSPENDED] += n_suspended
-    clamps[C_CAVITATED] += n_cavitated
-    clamps[C_FLOOR] += n_floor
-    clamps[C_CEILING] += n_ceiling
-    clamps[C_TENSION] += n_tension
-    return moved, bad, n_suspended, limit, limit_speed
+                        if wet:
+                            # missing water constrains nothing, so nothing locks: it is remembered by the element's
+                            # own rates, which are what moves its points
+                            el = wet_l if p > 0.0 else own_l
+                            p -= bulk_liquid / n * ((1.0 - n) * es + n * el)
+                            row[P] = p
+                            if p < 0.0:
+                                n_cavitated += 1
+                        # looser than in the ground, grains close up by what moves them; else with the skeleton's strain
+                        change = es if n > s[S_N0] else ts
+                        if not (loose and p <= 0.0 and change > 0.0):
+                            n = 1.0 - (1.0 - n) / (1.0 + change)
+                            if n < POROSITY_FLOOR:
+                                n = POROSITY_FLOOR
+                                n_floor += 1
+                            elif n > POROSITY_CEILING:
+                                n = POROSITY_CEILING
+                                n_ceiling += 1
+                            row[N] = n
+                        if n >= s[S_LOOSE]:
+                            row[SXX] = row[SYY] = row[SZZ] = row[SXY] = 0.0
+                            n_suspended += 1
+                        else:
+                            lam, shear = s[S_LAMBDA], s[S_G]
+                            sxx, syy, sxy = row[SXX], row[SYY], row[SXY]
+                            turn = 2.0 * spin * sxy
+                            txx = sxx - turn + lam * ts + 2.0 * shear * exx
+                            tyy = syy + turn + lam * ts + 2.0 * shear * eyy
+                            txy = sxy + spin * (sxx - syy) + 2.0 * shear * exy
+                            tzz = row[SZZ] + lam * ts
+                            if plastic and s[S_MODEL] != MODEL_ELASTIC:
+                                txx, tyy, tzz, txy, cut = mohr_coulomb(
+                                    txx, tyy, tzz, txy, shear, s[S_K], s[S_C_COS], s[S_SIN], s[S_SIN_DIL], s[S_APEX],
+                                    s[S_TENSION],
+                                )  # fmt: skip
+                                if cut > 0.0:
+                                    n_tension += 1
+                            row[SXX], row[SYY], row[SZZ], row[SXY] = txx, tyy, tzz, txy
+                    if bad < 0 and not np.isfinite(
+                        row[SXX] + row[P] + row[VSX] + row[VSY] + row[VLX] + row[VLY] + row[N]
+                    ):
+                        bad = i
+                dx = row[X] - x0
+                dy = row[Y] - y0
+                n1 = g1x * dx + g1y * dy
+                n2 = g2x * dx + g2y * dy
+                if n1 < 0.0 or n2 < 0.0 or n1 + n2 > 1.0:
+                    element_of_point[i] = -2 - e  # left: to be searched from e
+                    moved += 1
+                    continue
+                m = row[MASS]
+                n = row[N]
+                v = m / (s[S_RHO_S] * (1.0 - n))
+                n0 = 1.0 - n1 - n2
+                ms0 += n0 * m
+                ms1 += n1 * m
+                ms2 += n2 * m
+                vx, vy = row[VSX], row[VSY]
+                sx0 += n0 * m * vx
+                sx1 += n1 * m * vx
+                sx2 += n2 * m * vx
+                sy0 += n0 * m * vy
+                sy1 += n1 * m * vy
+                sy2 += n2 * m * vy
+                fastest = max(fastest, vx * vx + vy * vy)
+                p = 0.0
+                if wet:
+                    w = v * density_liquid
+                    w0, w1, w2 = n0 * w, n1 * w, n2 * w
+                    ml0 += w0
+                    ml1 += w1
+                    ml2 += w2
+                    mn0 += n * w0
+                    mn1 += n * w1
+                    mn2 += n * w2
+                    drag = n * s[S_DRAG]
+                    d0 += drag * w0
+                    d1 += drag * w1
+                    d2 += drag * w2
+                    ux, uy = row[VLX], row[VLY]
+                    lx0 += w0 * ux
+                    lx1 += w1 * ux
+                    lx2 += w2 * ux
+                    ly0 += w0 * uy
+                    ly1 += w1 * uy
+                    ly2 += w2 * uy
+                    fastest = max(fastest, ux * ux + uy * uy)
+                    if row[P] > 0.0:
+                        p = row[P]
+                        pressed += v
+                    excess = v * (p - (n0 * p0 + n1 * p1 + n2 * p2))
+                    q0 += n0 * excess
+                    q1 += n1 * excess
+                    q2 += n2 * excess
+                    fp += v * p
+                fxx += v * (row[SXX] - p)
+                fyy += v * (row[SYY] - p)
+                fxy += v * row[SXY]
+                total += v
+            volume[e, 0] = total
+            volume[e, 1] = pressed
+            fastest = np.sqrt(fastest)
+            local = geometry[e, 7] / (wave_speed + fastest)
+            if local < limit:
+                limit = local
+                limit_speed = fastest
+            g0x, g0y = -g1x - g2x, -g1y - g2y
+            b = sums[i0]
+            b[B_MS] += ms0
+            b[B_PSX] += sx0
+            b[B_PSY] += sy0
+            b[B_FX] -= g0x * fxx + g0y * fxy
+            b[B_FY] -= g0x * fxy + g0y * fyy
+            b = sums[i1]
+            b[B_MS] += ms1
+            b[B_PSX] += sx1
+            b[B_PSY] += sy1
+            b[B_FX] -= g1x * fxx + g1y * fxy
+            b[B_FY] -= g1x * fxy + g1y * fyy
+            b = sums[i2]
+            b[B_MS] += ms2
+            b[B_PSX] += sx2
+            b[B_PSY] += sy2
+            b[B_FX] -= g2x * fxx + g2y * fxy
+            b[B_FY] -= g2x * fxy + g2y * fyy
+            if wet:
+                # the smallest of the element's nodal shares of volume: a node that hardly touches it is not overdrawn
+                share = 3.0 * min(ml0, ml1, ml2) / (density_liquid * total) if total > 0.0 else 0.0
+                damped = PROJECTION_SMOOTHING * geometry[e, 7] ** 2 * share * pressed
+                b = sums[i0]
+                b[B_ML] += ml0
+                b[B_MN] += mn0
+                b[B_D] += d0
+                b[B_Q] += q0 - damped * (g0x * px + g0y * py)
+                b[B_PLX] += lx0
+                b[B_PLY] += ly0
+                b[B_FLX] += g0x * fp
+                b[B_FLY] += g0y * fp
+                b = sums[i1]
+                b[B_ML] += ml1
+                b[B_MN] += mn1
+                b[B_D] += d1
+                b[B_Q] += q1 - damped * (g1x * px + g1y * py)
+                b[B_PLX] += lx1
+                b[B_PLY] += ly1
+                b[B_FLX] += g1x * fp
+                b[B_FLY] += g1y * fp
+                b = sums[i2]
+                b[B_ML] += ml2
+                b[B_MN] += mn2
+                b[B_D] += d2
+                b[B_Q] += q2 - damped * (g2x * px + g2y * py)
+                b[B_PLX] += lx2
+                b[B_PLY] += ly2
+                b[B_FLX] += g2x * fp
+                b[B_FLY] += g2y * fp
+        clamps[C_SUSPENDED] += n_suspended
+        clamps[C_CAVITATED] += n_cavitated
+        clamps[C_FLOOR] += n_floor
+        clamps[C_CEILING] += n_ceiling
+        clamps[C_TENSION] += n_tension
+        return moved, bad, n_suspended, limit, limit_speed
+
+    return update_points
 
 
-@kernel
-def map_point(row, soil, density_liquid, corner, geometry, nodes, sums):
-    """Add one point to the nodes of the element that holds it, as `update_points` does for those that stay.
+@cache
+def map_kernel(wet):
+    """Kernel `map_point` for points with pore water or without."""
 
-    row, soil, corner, geometry : one row of points, soils, elements and geometry.
-    Returns the volume of the point [m2] and its larger squared speed [m2/s2].
-    """
-    dx = row[X] - geometry[4]
-    dy = row[Y] - geometry[5]
-    n1 = geometry[0] * dx + geometry[1] * dy
-    n2 = geometry[2] * dx + geometry[3] * dy
-    m, n = row[MASS], row[N]
-    v = m / (soil[S_RHO_S] * (1.0 - n))
-    p = max(row[P], 0.0)
-    projected = (1.0 - n1 - n2) * nodes[corner[0], V_P] + n1 * nodes[corner[1], V_P] + n2 * nodes[corner[2], V_P]
-    fxx, fyy, fxy = v * (row[SXX] - p), v * (row[SYY] - p), v * row[SXY]
-    for k in range(3):
-        if k == 0:
-            weight, gx, gy = 1.0 - n1 - n2, -geometry[0] - geometry[2], -geometry[1] - geometry[3]
-        elif k == 1:
-            weight, gx, gy = n1, geometry[0], geometry[1]
-        else:
-            weight, gx, gy = n2, geometry[2], geometry[3]
-        b = sums[corner[k]]
-        w = weight * v * density_liquid
-        b[B_MS] += weight * m
-        b[B_ML] += w
-        b[B_MN] += n * w
-        b[B_D] += n * soil[S_DRAG] * w
-        b[B_Q] += weight * v * (p - projected)
-        b[B_PSX] += weight * m * row[VSX]
-        b[B_PSY] += weight * m * row[VSY]
-        b[B_PLX] += w * row[VLX]
-        b[B_PLY] += w * row[VLY]
-        b[B_FX] -= gx * fxx + gy * fxy
-        b[B_FY] -= gx * fxy + gy * fyy
-        b[B_FLX] += gx * v * p
-        b[B_FLY] += gy * v * p
-    return v, max(row[VSX] ** 2 + row[VSY] ** 2, row[VLX] ** 2 + row[VLY] ** 2)
+    @kernel
+    def map_point(row, soil, density_liquid, corner, geometry, nodes, sums):
+        """Add one point to the nodes of the element that holds it, as `update_points` does for those that stay.
+
+        row, soil, corner, geometry : one row of points, soils, elements and geometry.
+        Returns the volume of the point [m2] and its larger squared speed [m2/s2].
+        """
+        dx = row[X] - geometry[4]
+        dy = row[Y] - geometry[5]
+        n1 = geometry[0] * dx + geometry[1] * dy
+        n2 = geometry[2] * dx + geometry[3] * dy
+        m, n = row[MASS], row[N]
+        v = m / (soil[S_RHO_S] * (1.0 - n))
+        p = max(row[P], 0.0) if wet else 0.0
+        fxx, fyy, fxy = v * (row[SXX] - p), v * (row[SYY] - p), v * row[SXY]
+        fastest = row[VSX] ** 2 + row[VSY] ** 2
+        if wet:
+            fastest = max(fastest, row[VLX] ** 2 + row[VLY] ** 2)
+            excess = (
+                p - (1.0 - n1 - n2) * nodes[corner[0], V_P] - n1 * nodes[corner[1], V_P] - n2 * nodes[corner[2], V_P]
+            )
+        for k in range(3):
+            if k == 0:
+                weight, gx, gy = 1.0 - n1 - n2, -geometry[0] - geometry[2], -geometry[1] - geometry[3]
+            elif k == 1:
+                weight, gx, gy = n1, geometry[0], geometry[1]
+            else:
+                weight, gx, gy = n2, geometry[2], geometry[3]
+            b = sums[corner[k]]
+            b[B_MS] += weight * m
+            b[B_PSX] += weight * m * row[VSX]
+            b[B_PSY] += weight * m * row[VSY]
+            b[B_FX] -= gx * fxx + gy * fxy
+            b[B_FY] -= gx * fxy + gy * fyy
+            if wet:
+                w = weight * v * density_liquid
+                b[B_ML] += w
+                b[B_MN] += n * w
+                b[B_D] += n * soil[S_DRAG] * w
+                b[B_Q] += weight * v * excess
+                b[B_PLX] += w * row[VLX]
+                b[B_PLY] += w * row[VLY]
+                b[B_FLX] += gx * v * p
+                b[B_FLY] += gy * v * p
+        return v, fastest
+
+    return map_point

@@ -31,17 +31,21 @@ POINT_WIDTH = len(POINT_VARIABLES)
 (B_MS, B_ML, B_MN, B_D, B_PSX, B_PSY, B_PLX, B_PLY, B_Q, B_FX, B_FY, B_FLX, B_FLY) = range(13)
 BUFFER_WIDTH = 13
 
-# Node row: end-of-step velocities, their increments, masses, the pressure projection, smoothed rates.
-(V_MS, V_ML, V_SX, V_SY, V_LX, V_LY, V_DSX, V_DSY, V_DLX, V_DLY, V_P, V_TS, V_TL) = range(13)
-NODE_WIDTH = 13
+# Node row: end-of-step velocities, their increments, masses, the pressure projection, smoothed rates,
+# the mean gradient of the pressure projection.
+(V_MS, V_ML, V_SX, V_SY, V_LX, V_LY, V_DSX, V_DSY, V_DLX, V_DLY, V_P, V_TS, V_WS, V_WL, V_GX, V_GY) = range(16)
+NODE_WIDTH = 16
+NODAL_MEANS = 7  # what `element_rates` sums at a node
 
 # Element rates: strain rates, spin, divergence of both phases.
 (R_XX, R_YY, R_XY, R_W, R_DS, R_DL) = range(6)
 RATE_WIDTH = 6
 
 # Soil parameters, one row a soil.
-(S_MODEL, S_LAMBDA, S_G, S_K, S_C_COS, S_SIN, S_SIN_DIL, S_APEX, S_TENSION, S_LOOSE, S_DRAG, S_RHO_S) = range(12)
-SOIL_WIDTH = 12
+(
+    S_MODEL, S_LAMBDA, S_G, S_K, S_C_COS, S_SIN, S_SIN_DIL, S_APEX, S_TENSION, S_LOOSE, S_N0, S_DRAG, S_RHO_S,
+) = range(13)  # fmt: skip
+SOIL_WIDTH = 13
 MODEL_ELASTIC, MODEL_MOHR_COULOMB = 0, 1
 
 # Values that a clamp of the physics may touch; each is counted and reported with the run.

@@ -1,14 +1,16 @@
 #!/usr/bin/env bash
-# What Python packages cannot bring: uv, and the system libraries that the gmsh wheel loads.
+# What Python packages cannot bring: uv, and the system libraries that the gmsh wheel loads;
+# with --tests also the one of the openseespy wheel, which only a test uses.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 gmsh_packages="libglu1-mesa libgl1 libxrender1 libxcursor1 libxft2 libxinerama1 libgomp1"
+gmsh_libraries="libGLU.so.1 libGL.so.1 libXrender.so.1 libXcursor.so.1 libXft.so.2 libXinerama.so.1 libgomp.so.1"
 
 missing_libraries() {
     local library known
     known="$(/sbin/ldconfig -p)"
-    for library in libGLU.so.1 libGL.so.1 libXrender.so.1 libXcursor.so.1 libXft.so.2 libXinerama.so.1 libgomp.so.1; do
+    for library in "$@"; do
         [[ "$known" == *"$library"* ]] || echo -n "$library "
     done
 }
@@ -24,14 +26,26 @@ install_packages() {
     $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null
 }
 
-if [ "$(uname)" = Linux ] && [ -n "$(missing_libraries)" ]; then
+# need_libraries NAME "LIBRARIES" "DEBIAN PACKAGES"
+need_libraries() {
+    local missing
+    # shellcheck disable=SC2086
+    missing="$(missing_libraries $2)"
+    [ -z "$missing" ] && return
     if ! command -v apt-get >/dev/null; then
-        echo "gmsh needs these system libraries: $(missing_libraries)" >&2
-        echo "install them with your package manager (Debian names: $gmsh_packages)" >&2
+        echo "$1 needs these system libraries: $missing" >&2
+        echo "install them with your package manager (Debian names: $3)" >&2
         exit 1
     fi
     # shellcheck disable=SC2086
-    install_packages $gmsh_packages
+    install_packages $3
+}
+
+if [ "$(uname)" = Linux ]; then
+    need_libraries gmsh "$gmsh_libraries" "$gmsh_packages"
+    if [ "${1:-}" = --tests ]; then
+        need_libraries openseespy libblas.so.3 libblas3
+    fi
 fi
 
 export PATH="$PWD/.uv/bin:$HOME/.local/bin:$PATH"

@@ -1,8 +1,7 @@
 """The ring as beam elements: nodes, constant stiffness of segments and joints, and how tractions become nodal forces.
 
-Unknowns at a node: radial w (outward), tangential v (clockwise), rotation b (clockwise). Nodes run clockwise from
-the first joint
-(or the crown); a joint has two nodes at one place, the last of one segment and the first of the next.
+Unknowns at a node: radial w (outward), tangential v (clockwise), rotation b (clockwise). Nodes run clockwise from the
+first joint (or the crown); a joint has two nodes at one place, the last of one segment and the first of the next.
 """
 
 from __future__ import annotations
@@ -95,9 +94,8 @@ def element_matrices(ring: Ring, mesh: RingMesh) -> tuple[np.ndarray, np.ndarray
     bending, axial = ring.bending_stiffness, ring.axial_stiffness
     phi = 12 * bending / (ring.shear_stiffness * length**2)
     n = len(half)
-    # Rows of `local`: displacement along the chord and outward from it, and rotation, at both ends. The radius at
-    # an end leans
-    # by half the element's angle from the normal of the chord.
+    # Rows of `local`: displacement along the chord and outward from it, and rotation, at both ends. The radius at an
+    # end leans by half the element's angle from the normal of the chord.
     local = np.zeros((n, 6, 6))
     for end, lean in ((0, -half), (3, half)):
         local[:, end, end], local[:, end, end + 1] = np.sin(lean), np.cos(lean)
@@ -133,12 +131,12 @@ def joint_matrices(ring: Ring) -> tuple[np.ndarray, np.ndarray]:
     return jumps, jumps.T @ np.diag([spring.normal, spring.shear, spring.rotation]) @ jumps
 
 
-def constant_stiffness(ring: Ring, mesh: RingMesh) -> sparse.csr_array:
-    """Stiffness of segments and joints, (3 n_nodes, 3 n_nodes)."""
+def constant_stiffness(ring: Ring, mesh: RingMesh, with_joints: bool = True) -> sparse.csr_array:
+    """Stiffness of the segments, and of linear joints unless left out, (3 n_nodes, 3 n_nodes)."""
     element_stiffness = element_matrices(ring, mesh)[1]
     unknowns = [mesh.element_unknowns()]
     blocks = [element_stiffness]
-    if len(mesh.joint_after):
+    if with_joints and len(mesh.joint_after):
         unknowns.append(mesh.joint_unknowns())
         blocks.append(np.broadcast_to(joint_matrices(ring)[1], (len(mesh.joint_after), 6, 6)))
     index = np.concatenate(unknowns)
@@ -160,9 +158,8 @@ def traction_operator(ring: Ring, mesh: RingMesh, theta: np.ndarray) -> tuple[sp
     Returns
     -------
     pressure, shear : (3 n_nodes, n_theta) sparse
-        Forces [N/m] and couples [N m/m] per Pa. Statically equivalent to the traction, linear between the samples:
-        the force on each piece
-        of the face goes to the two nodes of its element with the couple that moves it there.
+        Forces [N/m] and couples [N m/m] per Pa. Statically equivalent to the traction, linear between the samples: the
+        force on each piece of the face goes to the two nodes of its element with the couple that moves it there.
     """
     rows, columns, pressure_values, shear_values = [], [], [], []
     for place in GAUSS:

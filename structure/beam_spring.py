@@ -9,7 +9,7 @@ from structure.beam_geometry import RingMesh, element_matrices, joint_matrices, 
 from structure.equilibrium import NoEquilibrium, RingEquilibrium
 from structure.lining import LiningFailure, LiningModel, check_pressures, response_dataset
 from structure.ring import Ring
-from structure.springs import limit_pressures
+from structure.springs import joint_spring, limit_pressures
 
 #: Resultant over the sum of all nodal forces below which a ring without ground counts as balanced.
 BALANCE_TOLERANCE = 1e-6
@@ -24,10 +24,9 @@ class BeamSpringLining(LiningModel):
 
     Notes
     -----
-    Forces are taken at the middle of every element, where the chord is parallel to the circle; so theta of the response
-    never falls on a joint. Soil springs start unstressed at the undeformed ring: the pressures given are what the
-    soil exerts there,
-    and the springs add what the ring's displacement mobilises.
+    Forces are taken at the middle of every element, where the chord is parallel to the circle; so theta of the
+    response never falls on a joint. Soil springs start unstressed at the undeformed ring: the pressures given are what
+    the soil exerts there, and the springs add what the ring's displacement mobilises.
     """
 
     def __init__(self, ring: Ring):
@@ -50,12 +49,12 @@ class BeamSpringLining(LiningModel):
         shear = ordered["soil_shear"].values.astype(float)
         loads, balanced = self._loads(theta, ordered["soil_pressure"] + ordered["water_pressure"], shear)
         self._refuse_unbalanced(loads, times)
-        displacements = self._displacements(loads, times)
+        displacements, slips = self._displacements(loads, times)
         springs = np.stack([self._equilibrium.spring_forces(row)[0].ravel() for row in displacements])
         fields = {"balanced_uplift": balanced}
         fields |= self._internal_forces(displacements)
-        fields |= self._joints(displacements)
-        fields |= self._balances(displacements, loads, springs)
+        fields |= self._joints(displacements, slips)
+        fields |= self._balances(displacements, slips, loads, springs)
         fields["shear_moment_residual"] = self._shear_moment_residual(fields, theta, shear, springs)
         fields |= self._movements(displacements)
         return self._dataset(pressures, fields, times)
@@ -88,8 +87,7 @@ class BeamSpringLining(LiningModel):
         return np.hypot(nodal[..., 0], nodal[..., 1]).sum(-1)
 
     def _refuse_unbalanced(self, loads, times):
-        """Refuse what nothing carries: any resultant of a free ring, a torque where the soil does not resist
-        sliding."""
+        """Refuse what nothing carries: any resultant of a free ring, a torque where the soil does not resist it."""
         ground = self.ring.ground
         if self.ring.support == "invert" or (ground is not None and ground.tangential_springs):
             return
@@ -111,11 +109,20 @@ class BeamSpringLining(LiningModel):
             )
 
     def _displacements(self, loads, times):
+        """Displacements, and the slips of the joints from which each was reached, in the order of the records."""
+        equilibrium = self._equilibrium
+        remembers = equilibrium.joints.remembers
+        if remembers and np.any(np.diff(times) <= 0):
+            raise ValueError(
+                "ring: times must ascend where joints slide (joint_friction_coefficient), got"
+                f" {times[int(np.argmax(np.diff(times) <= 0)) + 1]:g} s after a later one; sort the records by time"
+            )
         displacements = np.zeros_like(loads)
-        start = np.zeros(loads.shape[1])
+        slips = np.zeros((len(loads), len(self.ring.joint_angles)))
+        start, before, slip = np.zeros(loads.shape[1]), np.zeros(loads.shape[1]), equilibrium.unslipped
         for index, load in enumerate(loads):
             try:
-                start = self._equilibrium.solve(load, start)
+                start, slip = equilibrium.follow(load, start, slip, before)
             except NoEquilibrium as problem:
                 horizontal, vertical, _ = self._resultant(load)
                 raise LiningFailure(
@@ -123,18 +130,25 @@ class BeamSpringLining(LiningModel):
                     f" {vertical:.4g} N/m up): {problem}",
                     float(times[index]),
                 ) from problem
-            displacements[index] = start
-        return displacements
+            displacements[index], slips[index], before = start, slip, load
+            if remembers:
+                slip = equilibrium.joint_forces(start, slip).slip
+        return displacements, slips
 
     def _internal_forces(self, displacements):
         unknowns = displacements[:, self.mesh.element_unknowns()]
         axial, shear, first, second = np.einsum("eij,tej->ite", self._element_forces, unknowns)
         return {"axial_force": axial, "shear_force": shear, "bending_moment": (first + second) / 2}
 
-    def _joints(self, displacements):
+    def _joints(self, displacements, slips):
         unknowns = displacements[:, self.mesh.joint_unknowns()]
         opening, dislocation, rotation = np.einsum("ij,tkj->itk", self._joint_jumps, unknowns)
-        forces = self._forces_at_joints(displacements)
+        if self._equilibrium.joints.linear:
+            spring = joint_spring(self.ring)
+            stiffness = np.array([-spring.normal, spring.shear, spring.rotation])
+            forces = np.einsum("i,ij,tkj->itk", stiffness, self._joint_jumps, unknowns)
+        else:
+            forces = self._equilibrium.joint_forces(displacements, slips)
         return {
             "joint_opening": opening,
             "joint_dislocation": dislocation,
@@ -144,22 +158,13 @@ class BeamSpringLining(LiningModel):
             "joint_bending_moment": forces[2],
         }
 
-    def _forces_at_joints(self, displacements):
-        """Axial and shear force and moment of the joint springs, also where a stiffness is zero."""
-        stiffness = np.array(
-            [
-                -self.ring.joint_normal_stiffness,
-                self.ring.joint_shear_stiffness,
-                self.ring.joint_rotational_stiffness,
-            ]
-        )
-        unknowns = displacements[:, self.mesh.joint_unknowns()]
-        return np.einsum("i,ij,tkj->itk", stiffness, self._joint_jumps, unknowns)
-
-    def _balances(self, displacements, loads, springs):
+    def _balances(self, displacements, slips, loads, springs):
         reactions = springs.copy()
         held = self._equilibrium.held
-        internal = (self._equilibrium.stiffness @ displacements.T).T
+        if self._equilibrium.joints.linear:
+            internal = (self._equilibrium.stiffness @ displacements.T).T
+        else:
+            internal = np.stack(list(map(self._equilibrium.internal_forces, displacements, slips)))
         reactions[:, held] += (internal - loads - springs)[:, held]
         load_sum, reaction_sum = self._resultant(loads), self._resultant(reactions)
         gap = np.abs(load_sum + reaction_sum).max(0)

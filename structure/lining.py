@@ -4,13 +4,13 @@ Signs, in one place:
 
 - Angles theta run clockwise from the crown; s is the arc length of the centre line in that direction.
 - Soil and water pressure push inward; soil shear positive drags the lining clockwise. All act on the outer face.
-- N compression positive; M positive with tension on the outer face; Q = -dM/ds - m, with m the clockwise couple per
-  arc that
-  shear on the outer face brings half a thickness from the centre line: Q positive where the part at larger s pushes
-  the part at smaller s inward.
+- N compression positive; M positive with tension on the outer face; Q = -dM/ds - m, with m the
+  clockwise couple per arc that shear on the outer face brings half a thickness from the centre line: Q positive where
+  the part at larger s pushes the part at smaller s inward.
 - Radial displacement outward, tangential displacement and rotation clockwise positive.
-- Joint opening positive for a gap; N = -k_n opening. Joint rotation positive when the joint opens on the outside;
-  M = k_theta rotation. Joint dislocation positive when the clockwise segment steps inward; Q = k_s dislocation.
+- Joint opening positive for a gap; N = -k_n opening in a linear joint. Joint rotation positive when the joint opens on
+  the outside; M = k_theta rotation. Joint dislocation positive when the clockwise segment steps inward;
+  Q = k_s dislocation. Nonlinear joints (:mod:`structure.joint_laws`) start with these slopes.
 - Convergence positive when the diameter shortens; settlement downward positive.
 """
 
@@ -48,6 +48,9 @@ RESPONSE = {
     "balanced_uplift": (("time",), "N m-1", "vertical sum of pressures and weight balanced by radial soil pressure"),
 }
 
+#: Variables of a response that are no state of the ring: their change since the first record says nothing.
+NOT_ADDITIONAL = ("equilibrium_residual", "shear_moment_residual", "inflow_mass")
+
 #: name: (units, long name)
 COORDINATES = {
     "time": ("s", "time since the gate opened"),
@@ -82,8 +85,7 @@ class LiningModel(ABC):
         ----------
         pressures : xarray.Dataset
             soil_pressure, water_pressure, soil_shear (time, theta) [Pa] on the outer face; theta [degree] in any
-            periodic
-            sampling, linear in between.
+            periodic sampling, linear in between.
 
         Returns
         -------
@@ -151,3 +153,37 @@ def response_dataset(
         units, long_name = COORDINATES[name]
         axes[name] = (dimension, values, {"units": units, "long_name": long_name})
     return xr.Dataset(variables, coords=axes, attrs=attributes)
+
+
+def additional(response: xr.Dataset) -> xr.Dataset:
+    """What the event adds: every force and displacement less that of the first record.
+
+    The first record is the initial state, before the gate opens. The difference is one of total states, so it holds
+    for nonlinear springs and joints too; it is not the response to the difference of the pressures.
+
+    Parameters
+    ----------
+    response : xarray.Dataset
+        What :meth:`LiningModel.respond` returned, at least one record.
+
+    Returns
+    -------
+    xarray.Dataset
+        The same variables and coordinates, zero at the first record, long names beginning with "additional".
+        ``inflow_mass`` is carried along as it is; the residuals, which are no states, are left out.
+    """
+    if response.sizes.get("time", 0) == 0:
+        raise ValueError(
+            "additional: response must have a time dimension with at least one record, got"
+            f" {dict(response.sizes)}; keep the initial state, do not select a single time"
+        )
+    changed = {}
+    for name, variable in response.data_vars.items():
+        if name == "inflow_mass":
+            changed[str(name)] = variable
+        elif "time" in variable.dims and name not in NOT_ADDITIONAL:
+            difference = variable - variable.isel(time=0, drop=True)
+            changed[str(name)] = difference.assign_attrs(
+                variable.attrs, long_name=f"additional {variable.attrs.get('long_name', name)}"
+            )
+    return xr.Dataset(changed, coords=response.coords, attrs=response.attrs)

@@ -30,8 +30,7 @@ class Ground(BaseModel):
         Whether the soil resists sliding with a third of the normal stiffness.
     slip_at : {"outer_face", "centre_line"}
         Where the tangential springs take hold. "outer_face": where the soil is; a rotating section slips there too,
-        and the
-        reaction brings a couple. "centre_line": at the beam nodes, as load-structure programs usually do.
+        and the reaction brings a couple. "centre_line": at the beam nodes, as load-structure programs usually do.
     law : {"hyperbolic", "linear"}
         Reaction over displacement: Eq. (7), or its initial tangent without a limit.
     two_way : bool
@@ -74,14 +73,21 @@ class Ring(BaseModel):
     joint_normal_stiffness, joint_shear_stiffness : float
         [N/m] per metre of tunnel, that is N/m2: the whole joint, not per area of its face. Spread over the face it is
         k_n/t, so that the face alone would give the rotational stiffness k_n t^2/12.
+    joint_contact_only : bool
+        Whether the normal spring only presses; a joint with a gap then carries no axial force.
+    joint_contact_height : float, optional
+        Height h of the contact zone in the joint [m], at most the thickness. Given, the joint rotates with
+        `joint_rotational_stiffness` only while all of h is compressed (|M| up to N h/6) and gapes beyond, |M| staying
+        below N h/2 (:func:`structure.joint_laws.contact_moment`). A block of concrete as deep as high has
+        k_theta = E h^2/12 (Janssen).
+    joint_friction_coefficient : float, optional
+        mu [-]. Given, the joint slides where |Q| would exceed mu N; the slip stays, so records are taken in time order.
     ground : Ground or None
         None: no soil springs; then loads and weight must balance, or `support` must carry the difference.
     balance_uplift : bool
         A lining held fixed while its pressures are taken carries their vertical resultant (buoyancy less weight).
-        True: that
-        resultant is balanced at every time by a radial soil pressure a cos(theta) on the outer face, as much more
-        at the
-        crown as less at the invert. False: soil springs (or the support) carry it.
+        True: that resultant is balanced at every time by a radial soil pressure a cos(theta) on the outer face, as
+        much more at the crown as less at the invert. False: soil springs (or the support) carry it.
     support : {"free", "invert"}
         "invert": the ring is clamped at the node next to its invert, as in a test stand. "free": only the ground
         holds it.
@@ -102,6 +108,9 @@ class Ring(BaseModel):
     joint_rotational_stiffness: float = Field(default=0.0, ge=0)
     joint_normal_stiffness: float = Field(default=0.0, ge=0)
     joint_shear_stiffness: float = Field(default=0.0, ge=0)
+    joint_contact_only: bool = False
+    joint_contact_height: float | None = Field(default=None, gt=0)
+    joint_friction_coefficient: float | None = Field(default=None, ge=0)
     ground: Ground | None = None
     balance_uplift: bool = False
     support: Literal["free", "invert"] = "free"
@@ -128,9 +137,27 @@ class Ring(BaseModel):
         missing = sorted(stiffnesses - self.model_fields_set)
         if self.joint_angles and missing:
             raise ValueError(f"joints need {', '.join(missing)}, got none; state them, 0 for a free hinge")
+        self._check_joint_laws()
         if self.support == "invert" and self.ground is not None:
             raise ValueError("support must be 'free' where there is ground, got 'invert'; remove one of the two")
         return self
+
+    def _check_joint_laws(self):
+        height = self.joint_contact_height
+        if height is not None and height > self.thickness * (1 + 1e-9):
+            raise ValueError(
+                f"joint_contact_height must not exceed the thickness {self.thickness:g} m, got {height:g} m; give the"
+                " height over which the segments touch"
+            )
+        needs = {"joint_contact_height": ("joint_rotational_stiffness", "joint_normal_stiffness")}
+        needs["joint_friction_coefficient"] = ("joint_shear_stiffness", "joint_normal_stiffness")
+        for name, stiffnesses in needs.items():
+            for stiffness in stiffnesses if getattr(self, name) is not None and self.joint_angles else ():
+                if getattr(self, stiffness) == 0:
+                    raise ValueError(
+                        f"{stiffness} must be above 0 where {name} is given, got 0; this law limits the force of that"
+                        f" spring by the axial force in the joint: leave {name} out"
+                    )
 
     @property
     def thickness(self) -> float:

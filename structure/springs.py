@@ -39,9 +39,8 @@ def limit_pressures(ground: Ground) -> tuple[float, float]:
     p_n = 2 c cos(phi)/(1 - sin(phi)) + (1 + sin(phi))/(1 - sin(phi)) ds,  ds = (s_h + s_v)/2 nu/(1 - nu);
     p_t = (s_h + s_v)/2 tan(phi).
 
-    Source: Do et al. (2014), hyperstatic reaction method, *as usually quoted*. The primary source could not be
-    opened to
-    check it, so limits measured or agreed for a site belong into ``Ground.limit_pressure_normal`` and
+    Source: Do et al. (2014), hyperstatic reaction method, *as usually quoted*. The primary source could not be opened
+    to check it, so limits measured or agreed for a site belong into ``Ground.limit_pressure_normal`` and
     ``Ground.limit_pressure_tangential``, which win.
     """
     sin_phi = math.sin(math.radians(ground.friction_angle))

@@ -1,8 +1,8 @@
 """Closed forms for rings, and the pressures that theory expects on a tunnel before it leaks.
 
 Signs as in :mod:`structure.lining`. Thin ring of centre-line radius R, inextensible and without shear deformation
-unless said
-otherwise; here theta is in radians from the crown, clockwise, except in :func:`theoretical_pressures` (degrees).
+unless said otherwise; here theta is in radians from the crown, clockwise, except in :func:`theoretical_pressures`
+(degrees).
 """
 
 from __future__ import annotations
@@ -120,8 +120,7 @@ def distributed_couple_sin2(couple: float, radius: float, theta: np.ndarray) -> 
     """Forces under a clockwise couple m sin(2 theta) [N m per metre of arc and of tunnel].
 
     No force acts, so dQ/dtheta = N and dN/dtheta = -Q leave no second harmonic in N and Q; dM/ds = -Q - m then gives
-    M = m R/2 cos(2 theta). A shear t on the outer face, half a thickness from the centre line, brings m = t
-    thickness/2.
+    M = m R/2 cos(2 theta). A shear t on the outer face, half a thickness d off the centre line, brings m = t d/2.
     """
     zero = np.zeros_like(theta)
     return RingForces(zero, zero, couple * radius / 2 * np.cos(2 * theta))
@@ -138,11 +137,9 @@ def winkler_cos2_displacement(
 ) -> float:
     """Outward displacement [m] at the crown in two-way linear springs [Pa/m] under p cos(2 theta) and t sin(2 theta).
 
-    w = -(p + t/2)/(9 EI/R^4 + k_r + k_t/4). With a thickness, tractions and springs act on the outer face, half of
-    it outside
-    R: areas grow by 1 + thickness/(2 R), and the slip there is 1 - 3 thickness/(2 R) of the centre line's, for the
-    section
-    rotates by 3 w sin(2 theta)/(2 R) against a slip of -w sin(2 theta)/2.
+    w = -(p + t/2)/(9 EI/R^4 + k_r + k_t/4). With a thickness, tractions and springs act on the outer face, half of it
+    outside R: areas grow by 1 + thickness/(2 R), and the slip there is 1 - 3 thickness/(2 R) of the centre line's, for
+    the section rotates by 3 w sin(2 theta)/(2 R) against a slip of -w sin(2 theta)/2.
     """
     area = 1 + thickness / (2 * radius)
     slip = 1 - 3 * thickness / (2 * radius)
@@ -233,9 +230,8 @@ def theoretical_pressures(
 ) -> xr.Dataset:
     """Geostatic and hydrostatic pressures on an undisturbed circle, as a pressures dataset of one time.
 
-    Effective stresses s_v from the overburden and s_h = K0 s_v meet the circle with the normal s_v cos^2 + s_h
-    sin^2 and the
-    shear (s_v - s_h) sin cos.
+    Effective stresses s_v from the overburden and s_h = K0 s_v meet the circle with the normal s_v cos^2 + s_h sin^2
+    and the shear (s_v - s_h) sin cos.
 
     Parameters
     ----------

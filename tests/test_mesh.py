@@ -243,7 +243,7 @@ def test_layer_through_the_gate_is_refused(quick_scene):
 def test_layer_that_leaves_a_sliver_above_the_crown_is_refused_with_its_place(quick_scene):
     scene = quick_scene.mpm
     layer = scene.soils[0].model_dump()
-    with pytest.raises(MeshError, match=r"flattest near x = .* y = -20"):
+    with pytest.raises(MeshError, match=r"flattest near x = .* y = -(20|19.99)"):
         build_mesh(changed(scene, soils=[layer, {**layer, "top_depth": 19.99}]))
 
 

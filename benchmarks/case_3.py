@@ -1,0 +1,188 @@
+"""Everything that the main job must show, from one run of case 3: a table, its data and the pictures for the docs.
+
+    uv run python benchmarks/case_3.py                 # runs case 3 into runs/case-3 (minutes), then reports
+    uv run python benchmarks/case_3.py --run FOLDER    # reports on a finished run
+
+Writes docs/case-3.md, docs/case-3.json and docs/images/case-3-*.png.
+"""
+
+import argparse
+import json
+import os
+import platform
+import shutil
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+import coupling
+from coupling import postprocess
+from coupling.datasets import (
+    read_attributes,
+    read_group,
+    read_history,
+    read_mesh,
+    read_points,
+    read_pressures,
+    read_response,
+)
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+PICTURES = ("fields", "pressures", "internal_forces", "inflow")
+
+
+def measured(folder):
+    """The numbers of the report: list of (what, wanted, value as text, met or None), and the same as a dict."""
+    history, pressures, mesh = read_history(folder), read_pressures(folder), read_mesh(folder)
+    scene = coupling.load_scene(Path(folder) / "scene.toml")
+    gate = scene.mpm.gate.angle
+    rows, data = [], {}
+
+    def row(key, what, wanted, value, met, text):
+        rows.append((what, wanted, text, met))
+        data[key] = {"value": value, "wanted": wanted, "met": met}
+
+    for name, limit in (("soil_pressure", 0.02), ("water_pressure", 0.01)):
+        error = _initial_error(pressures, scene.mpm, name)
+        row(f"initial_{name}_error", f"initial {name.replace('_', ' ')} against theory, worst angle",
+            f"<= {limit:.0%}", error, bool(error <= limit), f"{error:.2%}")  # fmt: skip
+    steps = np.diff(history["inflow_mass"].values)
+    row("inflow_monotonic", "inflow mass grows from record to record", "always", float(steps.min()),
+        bool((steps >= 0).all()), f"smallest step {steps.min():.3g} kg/m")  # fmt: skip
+    rate, r_squared = postprocess.inflow_linearity(history, 100, 1000)
+    row("inflow_r_squared", "straight line through 100 .. 1000 kg/m, R2", ">= 0.98", r_squared, r_squared >= 0.98,
+        f"{r_squared:.4f} at {rate:.0f} kg/m/s")  # fmt: skip
+    end = float(history["inflow_mass"][-1])
+    row(
+        "end_of_run",
+        "stable to",
+        "2000 kg/m",
+        end,
+        end >= 2000,
+        f"{end:.0f} kg/m at {float(history['time'][-1]):.2f} s",
+    )
+    mass = history["grain_mass"].values
+    lost = float(np.abs(mass / mass[0] - 1).max())
+    row("grain_mass_error", "grain mass conserved", "1e-10", lost, lost <= 1e-10, f"{lost:.1e}")
+    beside = [gate - 5, gate + 5]
+    for name in ("soil_pressure", "water_pressure"):
+        ratio = postprocess.ratio_to_initial(pressures, name, 1000, beside)
+        row(f"{name}_beside_gate", f"{name.replace('_', ' ')} 5 degrees beside the gate at 1000 kg/m over initial",
+            "< 1/3", ratio, ratio < 1 / 3, f"{ratio:.2f}")  # fmt: skip
+    for angle, where in ((0, "crown"), (180, "invert")):
+        ratio = postprocess.ratio_to_initial(pressures, "soil_pressure", 1000, [angle])
+        row(f"soil_pressure_{where}", f"soil pressure at the {where} at 1000 kg/m over initial", "> 1", ratio,
+            ratio > 1, f"{ratio:.2f}")  # fmt: skip
+    areas = [float(postprocess.at_inflow(history, m)["flow_zone_area"]) for m in (250, 500, 1000, 1500, 2000)]
+    early, rapid, late = areas[1] / 500, (areas[2] - areas[1]) / 500, (areas[4] - areas[3]) / 500
+    row("flow_zone_stages", "flow zone grows slowly, rapidly, levels off", "slow < rapid > late",
+        [early, rapid, late], bool(early < rapid and late < rapid),
+        f"{early * 1000:.0f}, {rapid * 1000:.0f}, {late * 1000:.0f} m2 per 1000 kg/m "
+        f"(to 500, 500 .. 1000, 1500 .. 2000 kg/m)")  # fmt: skip
+    _smoothness(row, folder, mesh)
+    resting = postprocess.heap(read_points(folder, -1), mesh)
+    met = bool(0.4 <= resting["porosity"] <= 0.6)
+    text = f"{resting['porosity']:.2f} over {resting['area']:.2f} m2; median speed {resting['speed']:.2f} m/s"
+    row("heap_porosity", "porosity of the heap in the tunnel, by area", "0.4 .. 0.6", resting["porosity"], met, text)
+    return rows, data
+
+
+def _smoothness(row, folder, mesh):
+    masses = np.interp(
+        read_group(folder, "points")["time"], *(read_history(folder)[k] for k in ("time", "inflow_mass"))
+    )
+    snapshot = int(np.argmin(np.abs(masses - 1000)))
+    points = read_points(folder, snapshot)
+    for nearest, furthest in ((1, 2), (2, 6)):
+        steps = postprocess.pore_pressure_steps(points, mesh, nearest, furthest)
+        jump, off = (float(np.quantile(steps[k], 0.9)) for k in ("jump", "deviation"))
+        row(f"pore_pressure_jump_{nearest}_{furthest}",
+            f"pore pressure of neighbouring elements {nearest} .. {furthest} m from the gate at {masses[snapshot]:.0f} "
+            "kg/m, 90 % below", "< 10 %", jump, jump < 0.1,
+            f"{jump:.1%}; off the plane through their neighbours {off:.1%}")  # fmt: skip
+
+
+def _initial_error(pressures, scene, name):
+    """Largest difference from sigma_v (cos2 + K0 sin2) or hydrostatic pressure over the theory's value there."""
+    from mpm.points import initial_stress
+
+    tunnel, k0 = scene.tunnels[0], scene.soils[0].k0
+    angle = np.radians(pressures["theta"].values)
+    depth = tunnel.axis_depth - tunnel.outer_radius * np.cos(angle)
+    vertical, water = initial_stress(scene, depth)
+    theory = water if name == "water_pressure" else vertical * (np.cos(angle) ** 2 + k0 * np.sin(angle) ** 2)
+    return float(np.abs(pressures[name].isel(time=0).values / theory - 1).max())
+
+
+def forces(folder):
+    """Extreme forces of the ring at some inflow masses: rows of text."""
+    response = read_response(folder)
+    lines = []
+    for mass in (0, 100, 500, 1000, 1500, 2000):
+        if mass > float(response["inflow_mass"][-1]):
+            break
+        now = response.isel(time=0) if mass == 0 else postprocess.at_inflow(response, mass)
+        cells = [f"{mass}"]
+        for name in ("axial_force", "shear_force", "bending_moment"):
+            for pick in ("max", "min"):
+                index = int(getattr(now[name].values, f"arg{pick}")())
+                cells.append(f"{float(now[name][index]) / 1e3:.0f} ({float(now['theta'][index]):.0f})")
+        cells.append(" ".join(f"{v * 1e3:.2f}" for v in now["joint_rotation"].values))
+        lines.append("| " + " | ".join(cells) + " |")
+    return lines
+
+
+def report(folder):
+    """Write the page, its data and its pictures."""
+    rows, data = measured(folder)
+    attributes, history = read_attributes(folder), read_history(folder)
+    steps, points = int(history["steps"][-1]), int(history["point_steps"][-1])
+    machine = f"{os.cpu_count()} cores, {platform.machine()}, Python {platform.python_version()}"
+    seconds = float(attributes["cpu_seconds"])
+    verdict = {True: "yes", False: "**no**"}
+    page = [
+        "# Case 3, from the gate to the ring",
+        "",
+        f"Made by `uv run python benchmarks/case_3.py` on {datetime.now(UTC):%Y-%m-%d}: revision "
+        f"{attributes['revision']}, {machine}. {steps} steps, {points / 1e9:.2f} thousand million point-steps, "
+        f"{seconds:.0f} s of processor time, {float(attributes['wall_seconds']):.0f} s by the clock.",
+        "",
+        "| what | wanted | measured | met |",
+        "|---|---|---|---|",
+        *(f"| {what} | {wanted} | {text} | {verdict[bool(met)]} |" for what, wanted, text, met in rows),
+        "",
+        "Extreme forces of the beam-spring ring, per metre of tunnel, with their angle from the crown in degrees:",
+        "",
+        "| inflow kg/m | N max kN | N min kN | Q max kN | Q min kN | M max kN m | M min kN m | joint rotations mrad |",
+        "|---|---|---|---|---|---|---|---|",
+        *forces(folder),
+        "",
+        *(f"![{name.replace('_', ' ')}](images/case-3-{name.replace('_', '-')}.png)\n" for name in PICTURES),
+    ]
+    (DOCS / "case-3.md").write_text("\n".join(page), encoding="utf-8")
+    data["provenance"] = {k: str(attributes[k]) for k in ("revision", "versions", "created", "scene_sha256")} | {
+        "machine": machine,
+        "cpu_seconds": seconds,
+        "steps": steps,
+        "point_steps": points,
+    }
+    (DOCS / "case-3.json").write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    for name in PICTURES:
+        shutil.copy(Path(folder) / "figures" / f"{name}.png", DOCS / "images" / f"case-3-{name.replace('_', '-')}.png")
+    return rows
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--run", type=Path, help="folder of a finished run of case 3")
+    folder = parser.parse_args().run
+    if folder is None:
+        folder = Path("runs/case-3")
+        coupling.run(coupling.load_scene("case-3"), out=folder, overwrite=True, figures=True)
+    for what, wanted, text, met in report(folder):
+        print(f"{'met ' if met else 'FAIL'}  {what}: {text} (wanted {wanted})")
+
+
+if __name__ == "__main__":
+    main()

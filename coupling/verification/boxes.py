@@ -1,0 +1,47 @@
+"""Meshes without a tunnel: rectangles of crossed triangles, parts of them filled with soil."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+SOIL, EMPTY = 0, 3
+
+
+def box_mesh(x, y, filled=None, fixed_bottom=True):
+    """Crossed triangles on a rectangular grid, with the fields that :class:`mpm.Solver` reads of a mesh.
+
+    Parameters
+    ----------
+    x, y : (n,), (m,) float64
+        Grid lines, ascending [m]; the ground surface is y = 0. Left and right are smooth walls.
+    filled : callable or None
+        filled(x, y) of the elements' centres says which hold material at the start; None: those below y = 0.
+    fixed_bottom : bool
+        Bottom nodes are held in both directions; else only what the caller sets.
+
+    Returns
+    -------
+    types.SimpleNamespace
+        nodes, elements, region, boundary node lists; no lining, no gate.
+    """
+    x, y = np.asarray(x, float), np.asarray(y, float)
+    columns, rows = len(x) - 1, len(y) - 1
+    gx, gy = np.meshgrid(x, y)
+    nodes = np.column_stack([gx.ravel(), gy.ravel()])
+    j, i = np.divmod(np.arange(columns * rows), columns)
+    a = j * (columns + 1) + i
+    b, c, d = a + 1, a + columns + 1, a + columns + 2
+    odd = ((i + j) % 2).astype(bool)
+    first = np.where(odd[:, None], np.column_stack([a, b, d]), np.column_stack([a, b, c]))
+    second = np.where(odd[:, None], np.column_stack([a, d, c]), np.column_stack([b, d, c]))
+    elements = np.stack([first, second], axis=1).reshape(-1, 3).astype(np.int32)
+    cx, cy = nodes[elements].mean(axis=1).T
+    inside = cy < 0 if filled is None else np.asarray(filled(cx, cy), bool)
+    none = np.zeros(0, np.int32)
+    number = np.arange(len(nodes)).reshape(rows + 1, columns + 1)
+    return SimpleNamespace(
+        nodes=nodes, elements=elements, region=np.where(inside, SOIL, EMPTY).astype(np.int8),
+        outer_nodes=(), outer_theta=(), opening_nodes=none, corner_nodes=none, wall_nodes=none, wall_side=none,
+        inner_nodes=none, left=number[:, 0].astype(np.int32), right=number[:, -1].astype(np.int32),
+        bottom=number[0].astype(np.int32) if fixed_bottom else none, top=number[-1].astype(np.int32),
+    )  # fmt: skip

@@ -1,0 +1,184 @@
+"""Checks of a response: utilisations by hand, limits without defaults, and their picture."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from pydantic import ValidationError
+from test_ring_joints_and_springs import pressures, ring
+from test_sections import UNEQUAL, section
+
+from coupling import check_figures
+from structure import BeamSpringLining, CapacityRule, Limits, additional, check
+from structure.checks import UTILISATIONS
+from structure.sections import interaction, radial_utilisation
+
+RULE = dict(axial_force_factor=1.0, moment_factor=1.35, minimum_eccentricity=0.02, utilisation="radial")
+
+
+def limits(**changes):
+    values = dict(
+        segment=section(),
+        capacity=CapacityRule(**RULE),
+        gasket_opening=6e-3,
+        gasket_offset=0.1,
+        joint_dislocation=10e-3,
+        convergence_per_mille=5.0,
+    )
+    return Limits(**{name: value for name, value in (values | changes).items() if value is not None})
+
+
+@pytest.fixture(scope="module")
+def response():
+    lining = ring(joint_normal_stiffness=2e10, joint_contact_height=0.175)
+    return BeamSpringLining(lining).respond(pressures(4).assign(inflow_mass=("time", [0.0, 300.0, 600.0, 900.0])))
+
+
+@pytest.fixture(scope="module")
+def checked(response):
+    return check(response, limits())
+
+
+def test_response_stays_as_it_was_and_every_addition_is_described(response, checked):
+    for name in response.data_vars:
+        xr.testing.assert_identical(checked[name], response[name])
+    added = set(checked.data_vars) - set(response.data_vars)
+    assert set(UTILISATIONS) | {"largest_utilisation", "gasket_opening", "convergence_per_mille"} <= added
+    for name in added:
+        assert set(checked[name].attrs) == {"units", "long_name"}
+    assert json.loads(checked.attrs["limits"])["capacity"]["moment_factor"] == 1.35
+
+
+@pytest.mark.parametrize("place", ["argmax", "argmin"])
+def test_utilisation_of_one_section_by_hand(response, place):
+    checked = check(response, limits(segment=section(**UNEQUAL)))
+    boundary = interaction(section(**UNEQUAL), 0.35)
+    at = int(getattr(response["bending_moment"].values[2], place)())
+    axial, moment = (response[name].values[2, at] for name in ("axial_force", "bending_moment"))
+    assert np.sign(moment) == (1 if place == "argmax" else -1)
+    design = np.sign(moment) * max(1.35 * abs(moment), 0.02 * axial)
+    expected = radial_utilisation(boundary, np.array(axial), np.array(design))
+    # 1e-12: the same expression.
+    assert checked["section_utilisation"].values[2, at] == pytest.approx(expected, rel=1e-12)
+    assert 0.1 < expected < 3
+
+
+def test_least_eccentricity_acts_where_the_moment_vanishes(checked):
+    eccentricity = np.abs(checked["design_bending_moment"]) / checked["design_axial_force"]
+    # 1e-12: rounding of the division.
+    assert eccentricity.min() == pytest.approx(0.02, rel=1e-12)
+
+
+def test_joints_and_convergence_by_hand(response, checked):
+    opening = response["joint_opening"].values + 0.1 * response["joint_rotation"].values
+    assert (opening > 0).any() and (opening < 0).any()
+    # 1e-12: the same expressions.
+    np.testing.assert_allclose(checked["gasket_utilisation"], np.maximum(opening, 0) / 6e-3, rtol=1e-12)
+    np.testing.assert_allclose(
+        checked["dislocation_utilisation"], np.abs(response["joint_dislocation"]) / 10e-3, rtol=1e-12
+    )
+    larger = np.maximum(np.abs(response["convergence_horizontal"]), np.abs(response["convergence_vertical"]))
+    np.testing.assert_allclose(checked["convergence_per_mille"], 1e3 * larger / 6.6, rtol=1e-12)
+    np.testing.assert_allclose(checked["convergence_utilisation"], 1e3 * larger / 6.6 / 5.0, rtol=1e-12)
+
+
+def test_gasket_opens_on_the_side_that_the_rotation_opens(response):
+    outside = check(response, limits(gasket_offset=0.15))["gasket_opening"]
+    inside = check(response, limits(gasket_offset=-0.15))["gasket_opening"]
+    assert ((outside > inside) == (response["joint_rotation"] > 0)).all()
+
+
+def test_largest_utilisation_is_that_of_all_checks(checked):
+    parts = [checked[name].max([d for d in checked[name].dims if d != "time"]).values for name in UTILISATIONS]
+    np.testing.assert_array_equal(checked["largest_utilisation"], np.max(parts, axis=0))
+
+
+def test_only_what_is_limited_is_checked(response):
+    one = check(response, Limits(convergence_per_mille=3.0))
+    assert "section_utilisation" not in one and "gasket_utilisation" not in one
+    np.testing.assert_array_equal(one["largest_utilisation"], one["convergence_utilisation"])
+
+
+def test_what_the_event_adds_is_checked_alike(response):
+    one = check(additional(response), Limits(convergence_per_mille=3.0))
+    assert one["convergence_utilisation"][0] == 0 < one["convergence_utilisation"][-1]
+
+
+def test_constant_axial_force_differs_from_radial(response, checked):
+    rule = CapacityRule(**RULE | dict(utilisation="constant_axial_force"))
+    other = check(response, limits(capacity=rule))["section_utilisation"]
+    # below the balanced point compression helps: with N held the moment may grow further than along the ray
+    assert (other[0] < checked["section_utilisation"][0]).any()
+    assert ((other < 1) == (checked["section_utilisation"] < 1)).all()
+
+
+def test_limits_from_toml_are_the_same(tmp_path):
+    path = tmp_path / "limits.toml"
+    given = limits()
+    lines = [f"{k} = {v}" for k, v in given.model_dump().items() if not isinstance(v, dict)]
+    for table in ("segment", "capacity"):
+        lines += [f"[{table}]", *(f"{k} = {v!r}".replace("'", '"') for k, v in given.model_dump()[table].items())]
+    path.write_text("\n".join(lines))
+    assert Limits.from_toml(path) == given
+
+
+def test_limits_in_the_documentation_are_valid(tmp_path):
+    text = (Path(__file__).parent.parent / "docs" / "ring.md").read_text(encoding="utf-8")
+    path = tmp_path / "limits.toml"
+    path.write_text(text.split("```toml\n")[1].split("```")[0], encoding="utf-8")
+    assert Limits.from_toml(path) == limits()
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({}, "at least one limit"),
+        (dict(gasket_opening=6e-3), "gasket_offset must be given where gasket_opening is"),
+        (dict(gasket_offset=0.1), "gasket_opening must be given where gasket_offset is"),
+        (dict(segment=section()), "capacity must be given where segment is"),
+        (dict(convergence_per_mille=0.0), "greater than 0"),
+        (dict(opening=1.0), "Extra inputs"),
+    ],
+)
+def test_incomplete_limits_are_refused(values, message):
+    with pytest.raises(ValidationError, match=message):
+        Limits(**values)
+
+
+def test_rule_of_the_capacity_has_no_default():
+    assert all(field.is_required() for field in CapacityRule.model_fields.values())
+
+
+def test_responses_that_lack_something_are_refused(response):
+    with pytest.raises(ValueError, match="attribute 'ring'"):
+        check(response.drop_attrs(), limits())
+    unjointed = BeamSpringLining(ring(joint_angles=())).respond(pressures())
+    with pytest.raises(ValueError, match="limits of joints need a ring with joints"):
+        check(unjointed, limits())
+    assert "section_utilisation" in check(
+        unjointed, limits(gasket_opening=None, gasket_offset=None, joint_dislocation=None)
+    )
+
+
+def test_figure_shows_the_numbers_of_the_dataset(checked):
+    diagram, history = check_figures.checks(checked).axes[:2]
+    assert f"{checked['section_utilisation'].max().item():.2f}" in diagram.get_title()
+    assert diagram.get_xlabel() == "design bending moment [kN m/m]"
+    clouds = np.concatenate([cloud.get_offsets() for cloud in diagram.collections])
+    assert clouds[:, 0].max() == pytest.approx(checked["design_bending_moment"].max().item() / 1e3)
+    assert history.get_xlabel() == "inflow mass [kg/m]"
+    labels = {line.get_label(): line for line in history.lines}
+    for name, label in UTILISATIONS.items():
+        largest = checked[name].max([d for d in checked[name].dims if d != "time"])
+        np.testing.assert_array_equal(labels[label].get_ydata(), largest)
+
+
+def test_figure_of_a_single_state_without_section(response, tmp_path):
+    one = check(response.isel(time=[0]).drop_vars("inflow_mass"), Limits(convergence_per_mille=3.0))
+    figure = check_figures.checks(one)
+    figure.savefig(tmp_path / "checks.png")
+    assert len(figure.axes) == 1
+    with pytest.raises(ValueError, match=r"must come from structure\.check"):
+        check_figures.checks(response)

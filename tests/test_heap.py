@@ -1,0 +1,85 @@
+"""Material that falls inside a tunnel: it lands, comes to rest, and takes up the area that its grains need."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from coupling.postprocess import filled
+from mpm.scene import Scene
+from mpm.solver import Solver
+from mpm.variables import MASS, SXX, SXY, SYY, SZZ, V_P, VSX, VSY, P
+
+GRAIN_DENSITY, POROSITY, LOOSE = 2650.0, 0.45, 0.55
+
+
+def box_mesh(width, height, size, block):
+    """Crossed triangles in a closed box; only the elements inside `block` (x0, x1, y0, y1) are filled."""
+    columns, rows = round(width / size), round(height / size)
+    x, y = np.meshgrid(np.arange(columns + 1) * size - width / 2, np.arange(rows + 1) * size - height)
+    nodes = np.column_stack([x.ravel(), y.ravel()])
+    elements = []
+    for j in range(rows):
+        for i in range(columns):
+            a = j * (columns + 1) + i
+            b, c, d = a + 1, a + columns + 1, a + columns + 2
+            elements += [[a, b, d], [a, d, c]] if (i + j) % 2 else [[a, b, c], [b, d, c]]
+    elements = np.array(elements, np.int32)
+    cx, cy = nodes[elements].mean(axis=1).T
+    inside = (cx > block[0]) & (cx < block[1]) & (cy > block[2]) & (cy < block[3])
+    none = np.zeros(0, np.int32)
+    return SimpleNamespace(
+        nodes=nodes, elements=elements, region=np.where(inside, 0, 3).astype(np.int8), outer_nodes=(), outer_theta=(),
+        opening_nodes=none, corner_nodes=none, wall_nodes=none, wall_side=none, inner_nodes=none,
+        left=np.flatnonzero(x.ravel() < -width / 2 + 1e-9).astype(np.int32),
+        right=np.flatnonzero(x.ravel() > width / 2 - 1e-9).astype(np.int32),
+        bottom=np.arange(columns + 1, dtype=np.int32), top=none,
+    )  # fmt: skip
+
+
+def dropped_block(width=1.6, size=0.1):
+    """A stress-free block of sand and water, 0.6 m by 0.6 m, released 0.3 m above the floor of a box."""
+    scene = Scene.model_validate({
+        "name": "block",
+        "box": {"width": width, "depth": 2.0},
+        "water": {"table_depth": 0.0, "density": 1000.0, "bulk_modulus": 8e7},
+        "soils": [{
+            "name": "sand", "top_depth": 0.0, "model": "mohr-coulomb", "youngs_modulus": 4e7, "poissons_ratio": 0.3,
+            "cohesion": 0.0, "friction_angle": 25.0, "dilatancy_angle": 0.0, "tensile_strength": 0.0,
+            "porosity": POROSITY, "loose_porosity": LOOSE, "grain_density": GRAIN_DENSITY,
+            "hydraulic_conductivity": 1e-4, "k0": 0.5,
+        }],
+        "discretisation": {
+            "element_size": size, "element_size_lining": size, "element_size_interior": size, "gate_radius": size,
+        },
+        "stop": {"time": 1.0},
+        "output": {"interval": 1.0},
+    })  # fmt: skip
+    solver = Solver(scene, box_mesh(width, 2.0, size, (-0.3, 0.3, -1.7, -1.1)))
+    solver.points[:, [P, SXX, SYY, SZZ, SXY]] = 0.0
+    solver.nodes[:, V_P] = 0.0
+    return solver
+
+
+def test_dropped_block_lands_and_takes_up_the_area_its_grains_need():
+    solver = dropped_block()
+    mass = np.sum(solver.points[:, MASS])
+    fastest = 0.0
+    while solver.time < 3.0:
+        solver.step()
+        fastest = max(fastest, speed(solver)) if solver.step_count % 100 == 0 else fastest
+    assert fastest > 0.7 * np.sqrt(2 * 9.81 * 0.3)  # it did fall
+    assert speed(solver) < 0.02 * fastest
+    assert np.sum(solver.points[:, MASS]) == mass
+    element, area = solver.element_of_point, solver.geometry[:, 6]
+    volume = np.bincount(element, solver.points_by_name()["volume"], len(area))
+    solid = np.bincount(element, solver.points[:, MASS] / GRAIN_DENSITY, len(area))
+    heap = filled(volume, area, solver.mesh.elements)
+    # the rest lies in elements of the surface that are less than half full
+    assert solid[heap].sum() > 0.9 * mass / GRAIN_DENSITY
+    # from as dense as it fell to just touching
+    assert 0.9 * POROSITY < 1 - solid[heap].sum() / area[heap].sum() < 1.1 * LOOSE
+
+
+def speed(solver):
+    """Root mean square of the grains' velocity [m/s]."""
+    return float(np.sqrt(np.mean(np.sum(solver.points[:, VSX : VSY + 1] ** 2, axis=1))))
