@@ -380,10 +380,12 @@ def _refuse_unsupported(ring: Ring):
     """Refuse options of the ring that this model does not know, rather than leave them out silently."""
     known = {
         "section": ("timoshenko", "always deforms in shear"),
-        "joint_law": ("linear", "has linear joints only"),
+        "joint_contact_only": (False, "has linear joints only"),
+        "joint_contact_height": (None, "has linear joints only"),
+        "joint_friction_coefficient": (None, "has linear joints only"),
     }
     for name, (value, reason) in known.items():
-        given = getattr(ring, name, value)
+        given = getattr(ring, name)
         if given != value:
             raise ValueError(
                 f"ring: {name} must be {value!r} for the continuum model, which {reason}, got {given!r};"

@@ -6,15 +6,10 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import lapack
 
-from structure.equilibrium import (
-    LARGEST_DISPLACEMENT,
-    MAX_ITERATIONS,
-    RESIDUAL_TOLERANCE,
-    SMALLEST_PIVOT,
-    TANGENT_FLOOR,
-    NoEquilibrium,
-)
+from structure.banded import SMALLEST_PIVOT
+from structure.equilibrium import LARGEST_DISPLACEMENT, MAX_ITERATIONS, RESIDUAL_TOLERANCE, NoEquilibrium
 from structure.ring import Ring
+from structure.ring_forces import TANGENT_FLOOR
 from structure.springs import soil_reaction, soil_springs
 
 #: Roundings of the largest product in a row of the stiffness (up to 60 terms) that residuals cannot get below.
