@@ -1,9 +1,14 @@
 """Numbers and pictures of docs/lining-models.md: both lining models compared, their cost, and the open gate.
 
-Run `uv run python benchmarks/lining_models.py` from the repository root; it prints tables and writes docs/images.
+uv run python benchmarks/lining_models.py       # under a minute; writes tables and pictures of docs/lining-models.md
 """
 
+import os
+import platform
+import re
+
 import time as clock
+from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,11 +22,13 @@ from matplotlib.figure import Figure
 from coupling.compare import compare
 from coupling.compare_figures import forces_compared, joints_compared
 from coupling.figures import RESOLUTION, STYLE
+from coupling.provenance import root_attributes
 from coupling.scene import load_scene
 from structure import BeamSpringLining, ContinuumLining, LiningFailure
 from structure.theory import curved_section_moment, theoretical_pressures
 
-IMAGES = Path(__file__).parent.parent / "docs" / "images"
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+IMAGES = DOCS / "images"
 GATE = (90.0, 0.2)
 
 
@@ -44,25 +51,42 @@ def pressures(scene, n_times):
     return loads
 
 
+def write(name, lines):
+    """Replace the block of that name in the document, between its two comments."""
+    document = DOCS / "lining-models.md"
+    text = document.read_text(encoding="utf-8")
+    begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
+    if begin not in text:
+        raise ValueError(f"{document}: block {name!r} must be marked by '{begin.strip()}', got none")
+    body = "\n".join(lines) + "\n"
+    text = re.sub(re.escape(begin) + ".*?" + re.escape(end), lambda _: begin + body + end, text, flags=re.S)
+    document.write_text(text, encoding="utf-8")
+    print(body)
+
+
 def cost(scene):
     """CPU seconds of both models for 1000 times, construction included."""
     loads = pressures(scene, 1000)
+    lines = ["| model | CPU time for 1000 times [s] |", "|---|---|"]
     for name, model in {"beam-spring": BeamSpringLining, "continuum": ContinuumLining}.items():
         begin = clock.process_time()
         model(scene.ring).respond(loads)
-        print(f"1000 times, {name}: {clock.process_time() - begin:.2f} s CPU")
+        lines.append(f"| {name} | {clock.process_time() - begin:.2f} |")
+    write("cost", lines)
 
 
 def difference_table(scene):
     """The table of `gush compare`, and its pictures."""
     source = SimpleNamespace(ring=scene.ring, pressures=pressures(scene, 100), file="synthetic")
     comparison = compare(source)
+    lines = ["| quantity | largest difference | of the extreme | where | when | known cause |", "|---" * 6 + "|"]
     for row in comparison.rows:
         where = f"joint {row['joint']}" if row["theta"] is None else f"{row['theta']:g}°"
-        print(
+        lines.append(
             f"| {row['label']} | {row['difference'] * row['scale']:+.3g} {row['unit']} | {100 * row['relative']:.2f} %"
             f" | {where} | {row['inflow_mass']:.0f} kg/m | {row['cause'] or '-'} |"
         )
+    write("differences", lines)
     forces_compared(comparison.responses).savefig(IMAGES / "lining_models_forces.png", dpi=110)
     joints_compared(comparison.responses).savefig(IMAGES / "lining_models_joints.png", dpi=110)
 
@@ -71,18 +95,20 @@ def open_gate(scene):
     """What neglecting the gate costs, for holes of some shares of the tunnel's length."""
     loads = pressures(scene, 2)
     whole = ContinuumLining(scene.ring).respond(loads)
+    lines = ["| cut | pressures | N | Q | M | radial displacement | joint rotation |", "|---" * 7 + "|"]
     for cut in (0.05, 1 / 6, 0.5, 0.9, 1.0):
         try:
             hole = ContinuumLining(scene.ring, opening=(*GATE, cut)).respond(loads)
         except LiningFailure as failure:
-            print(f"cut {cut:.2f}: {failure}")
+            lines.append(f"| {cut:.2f} | initial | {failure} | | | | |")
             continue
         for time, state in ((0, "initial"), (1, "final")):
             cells = []
             for name in ("axial_force", "shear_force", "bending_moment", "displacement_radial", "joint_rotation"):
                 one, other = whole[name].isel(time=time), hole[name].isel(time=time)
                 cells.append(f"{100 * float(np.abs(other - one).max() / np.abs(one).max()):.1f} %")
-            print(f"| {cut:.2f} | {state} | " + " | ".join(cells) + " |")
+            lines.append(f"| {cut:.2f} | {state} | " + " | ".join(cells) + " |")
+    write("open gate", lines)
 
 
 def error_over_time(scene):
@@ -120,7 +146,6 @@ def error_over_time(scene):
             for name in names
         ]
         curves.setdefault(label, []).append((seconds, *errors, count))
-        print(f"{label}, {count}: {seconds:.2f} s, M {errors[0]:.2e}, w {errors[1]:.2e}")
 
     # what loads on first use is no cost of a time step
     BeamSpringLining(scene.ring).respond(loads)
@@ -137,6 +162,13 @@ def error_over_time(scene):
                 lambda count=count, layers=layers: ContinuumLining(scene.ring, columns=count, layers=layers),
                 count,
             )
+    lines = [
+        "| model | elements around | CPU time for 50 times [s] | error of M | error of displacement |",
+        "|---" * 5 + "|",
+    ]
+    for label, rows in curves.items():
+        lines += [f"| {label} | {count} | {s:.2f} | {moment:.1e} | {w:.1e} |" for s, moment, w, count in rows]
+    write("errors", lines)
     _draw_errors(curves)
 
 
@@ -200,6 +232,11 @@ def main():
     error_over_time(scene)
     open_gate(scene)
     joint_stresses(scene)
+    provenance = (
+        f"Measured on {datetime.now(UTC):%Y-%m-%d}, {platform.machine()}, {os.cpu_count()} cores, Python"
+        f" {platform.python_version()}, revision {root_attributes()['revision']}."
+    )
+    write("provenance", [provenance])
 
 
 if __name__ == "__main__":
