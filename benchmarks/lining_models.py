@@ -6,7 +6,6 @@ uv run python benchmarks/lining_models.py       # under a minute; writes tables 
 import os
 import platform
 import re
-
 import time as clock
 from datetime import UTC, datetime
 from functools import cache
@@ -234,7 +233,7 @@ def main():
     joint_stresses(scene)
     provenance = (
         f"Measured on {datetime.now(UTC):%Y-%m-%d}, {platform.machine()}, {os.cpu_count()} cores, Python"
-        f" {platform.python_version()}, revision {root_attributes()['revision']}."
+        f" {platform.python_version()}, revision {root_attributes(scene)['revision']}."
     )
     write("provenance", [provenance])
 
