@@ -1,4 +1,4 @@
-"""The command line `gush`: run, plan, respond, scenes, bench.
+"""The command line `gush`: run, plan, respond, compare, scenes, bench.
 
 Exit codes: 0 done, 2 refused input, 3 run failed, 130 interrupted. Heavy libraries load inside the commands.
 """
@@ -27,6 +27,10 @@ app = typer.Typer(
 
 SceneName = Annotated[str, typer.Argument(help="A built-in scene (see `gush scenes`) or a TOML file.")]
 JsonPath = Annotated[Path | None, typer.Option("--json", help="Also write the result as JSON; - prints it.")]
+SOURCE = "Folder or run.nc of a run, or a netCDF-4 file with pressures that follow the schema."
+RingScene = Annotated[
+    str | None, typer.Option("--scene", help="Scene whose ring is taken; that of the run when left out.")
+]
 Threads = Annotated[int | None, typer.Option(min=1, help="Threads; all cores when left out. Does not change results.")]
 
 
@@ -88,29 +92,65 @@ def plan_command(scene: SceneName, threads: Threads = None, json_path: JsonPath 
 
 @app.command("respond")
 def respond_command(
-    run: Annotated[Path, typer.Argument(help="Folder (or run.nc) of a run.")],
+    run: Annotated[Path, typer.Argument(help=SOURCE)],
+    backend: Annotated[str, typer.Option(help="Lining model: beam-spring, continuum, or a registered one.")] = (
+        "beam-spring"
+    ),
+    scene: RingScene = None,
     json_path: JsonPath = None,
 ):
-    """Compute the ring's response (beam-spring) to the pressures of a run, and store it with the run.
+    """Compute the ring's response to the pressures of a run, and store it with them as /structure/BACKEND.
 
-    JSON: keys of `coupling.summary.summarise_response`, and `run`.
+    JSON: keys of `coupling.summary.summarise_response`, and `run`, `backend`.
     """
     with _failures(), _checked_json(json_path):
-        import tomllib
-
-        from coupling.datasets import read_attributes, read_pressures, run_file, write_response
-        from coupling.run import respond
-        from coupling.scene import make_scene
+        from coupling.datasets import write_response
+        from coupling.pressure_source import read_source
+        from coupling.run import respond_by_name
         from coupling.summary import summarise_response
 
-        file = run_file(run)
-        scene = make_scene(tomllib.loads(read_attributes(file)["scene"]), str(file))
-        response = respond(scene, read_pressures(file))
-        write_response(file, response)
-        data = {"run": str(run), **summarise_response(response)}
+        source = read_source(run, scene)
+        response = respond_by_name(source.ring, source.pressures, backend)
+        write_response(source.file, response, backend)
+        data = {"run": str(run), "backend": backend, **summarise_response(response)}
         _write_json(json_path, data)
         if str(json_path) != "-":
             Console().print(_response_table(data))
+
+
+@app.command("compare")
+def compare_command(
+    run: Annotated[Path, typer.Argument(help=SOURCE)],
+    first: Annotated[str, typer.Option(help="Lining model.")] = "beam-spring",
+    second: Annotated[str, typer.Option(help="Lining model that is compared with it.")] = "continuum",
+    open_gate: Annotated[
+        float | None,
+        typer.Option(help="Cut the gate out of a continuum ring over this share of the tunnel's length (1: a slot)."),
+    ] = None,
+    scene: RingScene = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for differences and figures; beside RUN when left out.")] = (
+        None
+    ),
+    json_path: JsonPath = None,
+):
+    """Compare two lining models over the whole event: largest differences with place, time and cause; figures.
+
+    JSON: `run`, `models`, `cpu_seconds`, `rows` (see `coupling.compare.compare`), `differences`, `figures` (paths).
+    """
+    with _failures(), _checked_json(json_path):
+        from coupling.compare import compare, store
+        from coupling.pressure_source import read_source
+
+        source = read_source(run, scene)
+        comparison = compare(source, first, second, open_gate)
+        data = {"run": str(run), **store(comparison, source, out)}
+        _write_json(json_path, data)
+        if str(json_path) != "-":
+            console = Console()
+            console.print(_comparison_table(data))
+            times = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in data["cpu_seconds"].items())
+            console.print(f"CPU time for {data['times']} times: {times}", highlight=False)
+            console.print(f"results in {Path(data['differences']).parent}", highlight=False, soft_wrap=True)
 
 
 @app.command("scenes")
@@ -345,6 +385,23 @@ def _response_table(data):
         if data[name]["final"]:
             cells = (" ".join(f"{1e3 * value:.2f}" for value in data[name][state]) for state in ("initial", "final"))
             table.add_row(label.replace("[", "\\["), *cells)
+    return table
+
+
+def _comparison_table(data):
+    first, second = data["models"]
+    table = Table("quantity", "largest difference", "of the extreme", "where", "when", "known cause")
+    table.title = f"{second} less {first}"
+    for row in data["rows"]:
+        where = f"joint {row['joint']}" if row["joint"] is not None else f"{row['theta']:.4g} deg"
+        table.add_row(
+            row["label"],
+            f"{row['difference'] * row['scale']:+.3g} {row['unit']}",
+            f"{100 * row['relative']:.2f} %",
+            where,
+            f"{row['time']:.3g} s",
+            row["cause"] or "-",
+        )
     return table
 
 

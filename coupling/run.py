@@ -79,15 +79,37 @@ def finish(scene, folder, progress):
     return draw_run(folder, folder / FIGURES)
 
 
-def respond(scene, pressures):
-    """Response of the scene's ring (beam-spring) to the pressures on the tunnel with the gate."""
-    from structure import BeamSpringLining
+def respond(scene, pressures, backend="beam-spring"):
+    """Response of the scene's ring to the pressures on the tunnel with the gate, by the lining model of that name.
 
+    Raises
+    ------
+    RunRefused
+        No ring, no such model, or pressures or ring that the model does not take.
+    structure.LiningFailure
+        No equilibrium.
+    """
     if scene.ring is None:
         raise RunRefused(f"scene '{scene.name}': has no [ring]; add one to get internal forces")
     if "tunnel" in pressures.dims:
         pressures = pressures.isel(tunnel=scene.mpm.gate.tunnel if scene.mpm.gate else 0, drop=True)
-    return BeamSpringLining(scene.ring).respond(pressures)
+    return respond_by_name(scene.ring, pressures, backend)
+
+
+def respond_by_name(ring, pressures, backend, **options):
+    """Response of a ring by the lining model of that name; `options` go to the model.
+
+    Raises
+    ------
+    RunRefused, structure.LiningFailure
+        As :func:`respond`.
+    """
+    from structure import lining_model
+
+    try:
+        return lining_model(backend)(ring, **options).respond(pressures)
+    except ValueError as problem:
+        raise RunRefused(str(problem)) from problem
 
 
 def check_memory(mpm_scene):
@@ -164,4 +186,4 @@ def _logged_to(path):
         handler.close()
 
 
-__all__ = ["RunRefused", "check_memory", "finish", "free_memory_bytes", "respond", "run"]
+__all__ = ["RunRefused", "check_memory", "finish", "free_memory_bytes", "respond", "respond_by_name", "run"]

@@ -16,6 +16,11 @@ _HOMES = {
     "CapacityRule": "structure.checks",
     "SegmentSection": "structure.sections",
     "BeamSpringLining": "structure.beam_spring",
+    "ContinuumLining": "structure.continuum",
+    "Opening": "structure.continuum_mesh",
+    "lining_model": "structure.models",
+    "lining_model_names": "structure.models",
+    "register_lining_model": "structure.models",
     "theoretical_pressures": "structure.theory",
 }
 

@@ -5,14 +5,12 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from structure.balance import refuse_unbalanced
 from structure.beam_geometry import RingMesh, element_matrices, joint_matrices, self_weight, traction_operator
 from structure.equilibrium import NoEquilibrium, RingEquilibrium
 from structure.lining import LiningFailure, LiningModel, check_pressures, response_dataset
 from structure.ring import Ring
 from structure.springs import joint_spring, limit_pressures
-
-#: Resultant over the sum of all nodal forces below which a ring without ground counts as balanced.
-BALANCE_TOLERANCE = 1e-6
 
 
 class BeamSpringLining(LiningModel):
@@ -48,7 +46,7 @@ class BeamSpringLining(LiningModel):
         times = ordered["time"].values
         shear = ordered["soil_shear"].values.astype(float)
         loads, balanced = self._loads(theta, ordered["soil_pressure"] + ordered["water_pressure"], shear)
-        self._refuse_unbalanced(loads, times)
+        refuse_unbalanced(self.ring, self._resultant(loads), self._magnitude(loads), times)
         displacements, slips = self._displacements(loads, times)
         springs = np.stack([self._equilibrium.spring_forces(row)[0].ravel() for row in displacements])
         fields = {"balanced_uplift": balanced}
@@ -85,28 +83,6 @@ class BeamSpringLining(LiningModel):
     def _magnitude(self, forces: np.ndarray) -> np.ndarray:
         nodal = forces.reshape(*forces.shape[:-1], -1, 3)
         return np.hypot(nodal[..., 0], nodal[..., 1]).sum(-1)
-
-    def _refuse_unbalanced(self, loads, times):
-        """Refuse what nothing carries: any resultant of a free ring, a torque where the soil does not resist it."""
-        ground = self.ring.ground
-        if self.ring.support == "invert" or (ground is not None and ground.tangential_springs):
-            return
-        resultant = np.abs(self._resultant(loads))
-        if ground is not None:
-            resultant[:2] = 0
-        excess = resultant.max(0) > BALANCE_TOLERANCE * self._magnitude(loads)
-        if excess.any():
-            first = int(np.argmax(excess))
-            horizontal, vertical, torque = self._resultant(loads[first])
-            remedy = (
-                "give the ring a ground, balance_uplift or support='invert'"
-                if ground is None
-                else "switch tangential_springs on"
-            )
-            raise ValueError(
-                f"ring: loads must balance where nothing carries their sum, got {horizontal:.6g} N/m to the right,"
-                f" {vertical:.6g} N/m up, torque/radius {torque:.6g} N/m at time {times[first]:g} s; {remedy}"
-            )
 
     def _displacements(self, loads, times):
         """Displacements, and the slips of the joints from which each was reached, in the order of the records."""

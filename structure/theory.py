@@ -52,6 +52,61 @@ def radial_cos2_displacement(
     return -pressure * radius**2 / 9 * (radius**2 / bending_stiffness + 1 / axial_stiffness + 4 / shear_stiffness)
 
 
+def thick_ring_uniform(
+    pressure: float, inner_radius: float, outer_radius: float, radius: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Radial and hoop stress [Pa], tension positive, of a thick ring under a uniform outer pressure (Lamé)."""
+    mean = -pressure * outer_radius**2 / (outer_radius**2 - inner_radius**2)
+    return mean * (1 - inner_radius**2 / radius**2), mean * (1 + inner_radius**2 / radius**2)
+
+
+class ThickRing(NamedTuple):
+    """Plane-strain ring under p cos(2 theta) inward and t sin(2 theta) clockwise on its outer face.
+
+    Airy's function (a r^2 + b r^4 + c r^-2 + d) cos(2 theta). Source: Michell (1899), as tabulated by Barber,
+    Elasticity, Tables 8.1 and 9.1.
+    """
+
+    coefficients: np.ndarray
+    shear_modulus: float
+    poissons_ratio: float
+
+    def stresses(self, radius, theta):
+        """Radial, hoop and shear stress [Pa], tension positive."""
+        a, b, c, d = self.coefficients
+        cosine, sine = np.cos(2 * theta), np.sin(2 * theta)
+        return (
+            (-2 * a - 6 * c / radius**4 - 4 * d / radius**2) * cosine,
+            (2 * a + 12 * b * radius**2 + 6 * c / radius**4) * cosine,
+            (2 * a + 6 * b * radius**2 - 6 * c / radius**4 - 2 * d / radius**2) * sine,
+        )
+
+    def radial_displacement(self, radius, theta):
+        """Outward displacement [m]."""
+        a, b, c, d = self.coefficients
+        kappa = 3 - 4 * self.poissons_ratio
+        shape = -2 * a * radius + (kappa - 3) * b * radius**3 + 2 * c / radius**3 + (kappa + 1) * d / radius
+        return shape * np.cos(2 * theta) / (2 * self.shear_modulus)
+
+
+def thick_ring_cos2(
+    pressure: float,
+    shear: float,
+    inner_radius: float,
+    outer_radius: float,
+    youngs_modulus: float,
+    poissons_ratio: float,
+) -> ThickRing:
+    """Exact plane-strain ring under the second harmonic of pressure and shear; the inner face is free."""
+    rows = [
+        row
+        for r in (outer_radius, inner_radius)
+        for row in ([-2, 0, -6 / r**4, -4 / r**2], [2, 6 * r**2, -6 / r**4, -2 / r**2])
+    ]
+    coefficients = np.linalg.solve(np.array(rows), np.array([-pressure, shear, 0, 0]))
+    return ThickRing(coefficients, youngs_modulus / (2 * (1 + poissons_ratio)), poissons_ratio)
+
+
 def tangential_sin2(shear: float, radius: float, theta: np.ndarray) -> RingForces:
     """Forces under a shear t sin(2 theta) on the centre line, directed from crown and invert to the springline."""
     return RingForces(
@@ -127,6 +182,28 @@ def hinge_moments(
     release = np.sum(rigid_moments) / rotational_stiffness
     flexibility = 2 * np.pi * radius / bending_stiffness + len(rigid_moments) / rotational_stiffness
     return rigid_moments - release / flexibility
+
+
+def curved_section_moment(
+    axial_force: np.ndarray,
+    thickness: float,
+    radius: float,
+    bending_stiffness: float,
+    n_joints: int = 0,
+    rotational_stiffness: float = np.inf,
+) -> np.ndarray:
+    """Moment [N m/m] by which a thick ring exceeds one of straight beams: N t^2/(12 R), less what joints release.
+
+    The inner fibres of a curved section are shorter, so thrust on the centre line turns it as a moment -N t^2/(12 R)
+    would. In a closed ring those rotations, and those of n joints, must add up to zero, which takes a uniform moment
+    of N t^2/(12 R)/(1 + n EI/(2 pi R k)). Exact for a uniform N in a thin ring (Winkler's curved beam, first order).
+    """
+    offset = axial_force * thickness**2 / (12 * radius)
+    if n_joints == 0:
+        return offset
+    if rotational_stiffness == 0:
+        return 0 * offset
+    return offset / (1 + n_joints * bending_stiffness / (2 * np.pi * radius * rotational_stiffness))
 
 
 def einstein_schwartz_full_slip_moment(stress_ratio: float, poissons_ratio: float, flexibility_ratio: float) -> float:

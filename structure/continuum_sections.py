@@ -1,0 +1,80 @@
+"""Axial force, shear force, bending moment and displacement of whole sections of a continuum ring.
+
+Stresses are integrated across the thickness at the two places along each column where quadratic elements are most
+accurate, and taken linear in between: nothing is probed at points, which curved elements do not support.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from structure.continuum_mesh import ContinuumMesh
+from structure.continuum_stiffness import STRESS_POINTS, StressOperators
+
+
+def section_forces(
+    mesh: ContinuumMesh, stresses: StressOperators, centre_radius: float, theta: np.ndarray
+) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array]:
+    """N, Q and M at angles theta [rad] from the unknowns, (n_theta, n_unknowns) each; rows in the opening are zero.
+
+    N = -integral of the hoop stress, Q = -integral of the shear stress, M = integral of the hoop stress times
+    (r - R).
+    """
+    across, levers = _section_integrals(mesh, stresses, centre_radius)
+    column, place = mesh.locate(theta)
+    inside = np.flatnonzero(column >= 0)
+    share = (place[inside] - STRESS_POINTS[0]) / (STRESS_POINTS[1] - STRESS_POINTS[0])
+    station = 2 * column[inside]
+    between = sparse.coo_array(
+        (np.concatenate([1 - share, share]), (np.tile(inside, 2), np.concatenate([station, station + 1]))),
+        shape=(len(theta), 2 * len(mesh.column_lines)),
+    ).tocsr()
+    return (
+        -(between @ across @ stresses.hoop).tocsr(),
+        -(between @ across @ stresses.shear).tocsr(),
+        (between @ levers @ stresses.hoop).tocsr(),
+    )
+
+
+def _section_integrals(mesh: ContinuumMesh, stresses: StressOperators, centre_radius: float):
+    """Integrals of a stress, and of it times (r - R), across the stations, (2 n_columns, n_points) sparse each."""
+    count, layers = len(mesh.column_lines), mesh.layers
+    point = np.arange(4 * layers * count).reshape(count, layers, 2, 2)
+    # [column, place along, layer and place across]
+    points = point.transpose(0, 3, 1, 2).reshape(2 * count, 2 * layers)
+    height = (mesh.radius[-1] - mesh.radius[0]) / (2 * layers)
+    where = (np.repeat(np.arange(2 * count), 2 * layers), points.ravel())
+    lever = stresses.radius[points] - centre_radius
+    return tuple(
+        sparse.coo_array((values.ravel(), where), shape=(2 * count, point.size)).tocsr()
+        for values in (np.full(points.shape, height), height * lever)
+    )
+
+
+def edge_shapes(place: np.ndarray) -> np.ndarray:
+    """Quadratic shape functions of an edge at places from 0 to 1, (n, 3)."""
+    return np.stack([(1 - place) * (1 - 2 * place), 4 * place * (1 - place), place * (2 * place - 1)], axis=-1)
+
+
+def section_displacements(mesh: ContinuumMesh, theta: np.ndarray) -> tuple[sparse.csr_array, sparse.csr_array]:
+    """Mean radial and tangential displacement of the sections at theta [rad], (n_theta, n_unknowns) each."""
+    column, place = mesh.locate(theta)
+    inside = np.flatnonzero(column >= 0)
+    weights = edge_shapes(place[inside])[:, :, None] * mesh.level_mean
+    return tuple(_gather(mesh, mesh.column_lines[column[inside]], weights, inside, len(theta), way) for way in (0, 1))
+
+
+def column_means(mesh: ContinuumMesh, edge_mean: np.ndarray) -> tuple[sparse.csr_array, sparse.csr_array]:
+    """Mean radial and tangential displacement of whole columns, (n_columns, n_unknowns) each."""
+    count = len(mesh.column_lines)
+    weights = np.broadcast_to(edge_mean[:, None] * mesh.level_mean, (count, 3, mesh.n_levels))
+    return tuple(_gather(mesh, mesh.column_lines, weights, np.arange(count), count, way) for way in (0, 1))
+
+
+def _gather(mesh, lines, weights, rows, n_rows, direction):
+    unknowns = 2 * (lines[:, :, None] * mesh.n_levels + np.arange(mesh.n_levels)) + direction
+    return sparse.coo_array(
+        (weights.ravel(), (np.repeat(rows, 3 * mesh.n_levels), unknowns.ravel())),
+        shape=(n_rows, 2 * mesh.n_lines * mesh.n_levels),
+    ).tocsr()

@@ -1,0 +1,69 @@
+"""Lining models by name, so that a script or the command line swaps one for the other; open to a third party's own."""
+
+from __future__ import annotations
+
+import difflib
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from structure.lining import LiningModel
+
+#: Group of entry points under which an installed package announces its models: name = "module:Class".
+ENTRY_POINTS = "gush.lining_models"
+
+_BUILT_IN = {
+    "beam-spring": "structure.beam_spring:BeamSpringLining",
+    "continuum": "structure.continuum:ContinuumLining",
+}
+_REGISTERED: dict[str, type[LiningModel]] = {}
+
+
+def register_lining_model(name: str, model: type[LiningModel]):
+    """Make a model known by name in this process; its constructor takes a :class:`structure.ring.Ring`.
+
+    Raises
+    ------
+    ValueError
+        The name is taken.
+    """
+    if name in lining_model_names() and _REGISTERED.get(name) is not model:
+        raise ValueError(f"lining model {name!r}: the name is taken, choose another one")
+    _REGISTERED[name] = model
+
+
+def lining_model_names() -> list[str]:
+    """Names of the built-in, installed and registered models."""
+    return sorted({*_BUILT_IN, *_REGISTERED, *(entry.name for entry in _installed())})
+
+
+def lining_model(name: str) -> type[LiningModel]:
+    """The class of a lining model.
+
+    Parameters
+    ----------
+    name : str
+        One of :func:`lining_model_names`.
+
+    Raises
+    ------
+    ValueError
+        No such model.
+    """
+    if name in _REGISTERED:
+        return _REGISTERED[name]
+    if name in _BUILT_IN:
+        module, attribute = _BUILT_IN[name].split(":")
+        return getattr(import_module(module), attribute)
+    for entry in _installed():
+        if entry.name == name:
+            return entry.load()
+    near = difflib.get_close_matches(name, lining_model_names(), 1)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    raise ValueError(f"lining model {name!r}: unknown; {hint}known: {', '.join(lining_model_names())}")
+
+
+def _installed():
+    from importlib.metadata import entry_points
+
+    return entry_points(group=ENTRY_POINTS)
