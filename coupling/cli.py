@@ -205,6 +205,37 @@ def bench_command(
             Console().print(table)
 
 
+@app.command("accuracy")
+def accuracy_command(
+    problems: Annotated[list[str] | None, typer.Argument(help="Verification problems; all when left out.")] = None,
+    scene: Annotated[
+        str | None, typer.Option(help="Instead: a mesh ladder of this scene, at equal inflow mass.")
+    ] = None,
+    inflow_mass: Annotated[float, typer.Option(help="Last inflow mass of the mesh ladder [kg/m].")] = 1000.0,
+    fast: Annotated[bool, typer.Option("--fast", help="Default settings only, no ladders.")] = False,
+    out: Annotated[Path, typer.Option(help="Folder for the page, its data and pictures.")] = Path("accuracy"),
+    json_path: JsonPath = None,
+):
+    """Error against processor time over mesh size, time step and numerical options; a page, data and pictures.
+
+    JSON: see `coupling.accuracy.report.write`; with --scene `coupling.accuracy.ladder_report.write_ladder`.
+    """
+    with _failures(), _checked_json(json_path):
+        from coupling.accuracy.command import problem_ladders, scene_ladder
+
+        tell = Console(stderr=True).print
+        if scene is not None:
+            data = scene_ladder(scene, inflow_mass, out, tell)
+        else:
+            data = problem_ladders(problems or [], fast, out, tell)
+        _write_json(json_path, data)
+        if str(json_path) != "-":
+            console = Console()
+            if scene is None:
+                console.print(_accuracy_table(data))
+            console.print(f"page: {data['page']}", highlight=False, soft_wrap=True)
+
+
 def main():
     """Entry point of the command `gush`."""
     app()
@@ -402,6 +433,14 @@ def _comparison_table(data):
             f"{row['time']:.3g} s",
             row["cause"] or "-",
         )
+    return table
+
+
+def _accuracy_table(data):
+    table = Table("problem", "error", "limit", "CPU s", "default over the best of what costs no more")
+    for name, row in data["problems"].items():
+        limit = f"{row['limit']:.2g}" if row["within"] else f"[red]{row['limit']:.2g} exceeded[/red]"
+        table.add_row(name, f"{row['error']:.2e}", limit, f"{row['cpu_seconds']:.2f}", f"{row['excess']:.2f}")
     return table
 
 

@@ -16,7 +16,7 @@ def root_attributes(scene):
         "Conventions": "CF-1.11",
         "title": f"water and soil gushing into a tunnel: {scene.name}",
         "source": f"gushing {_version('gushing')}",
-        "revision": _revision(),
+        "revision": revision(),
         "versions": ", ".join(f"{name} {_version(name)}" for name in PACKAGES),
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "scene_name": scene.name,
@@ -32,7 +32,7 @@ def _version(package):
         return "not installed"
 
 
-def _revision():
+def revision():
     """Commit of the working copy this code runs from, '+changed' when files differ from it; '' outside of one."""
     home = Path(__file__).resolve().parent.parent
     if not (home / ".git").exists():

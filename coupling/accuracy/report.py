@@ -1,0 +1,117 @@
+"""The page about accuracy: one table of all problems, one picture and one table a problem."""
+
+from __future__ import annotations
+
+import math
+import os
+import platform
+from datetime import UTC, datetime
+from pathlib import Path
+
+from coupling.accuracy import figures
+from coupling.accuracy.ladders import assess, dataset
+from coupling.provenance import revision
+
+
+def write(rows: list[dict], problems: dict, folder: Path) -> dict:
+    """Write accuracy.md, accuracy.nc and images/ into a folder.
+
+    Parameters
+    ----------
+    rows : list of dict
+        Of :func:`coupling.accuracy.ladders.measure`, all problems.
+    problems : dict
+        Name to :class:`coupling.verification.Problem`.
+    folder : path
+
+    Returns
+    -------
+    dict
+        page, data : paths as text;  problems : name to default error, its limit, within (bool), cpu_seconds, orders,
+        excess (see :func:`coupling.accuracy.ladders.assess`).
+    """
+    folder = Path(folder)
+    (folder / "images").mkdir(parents=True, exist_ok=True)
+    by_name = {
+        name: [row for row in rows if row["problem"] == name] for name in dict.fromkeys(r["problem"] for r in rows)
+    }
+    summary = {name: _summary(mine, problems[name]) for name, mine in by_name.items()}
+    figures.save(figures.overview_figure(rows), folder / "images" / "accuracy-overview.png")
+    page = [
+        "# Error against run time",
+        "",
+        f"Made by `gush accuracy` {origin()}. Errors are in the norm of each problem, times are processor time of",
+        "stepping, one thread; compiling is left out.",
+        "",
+        "![overview](images/accuracy-overview.png)",
+        "",
+        "| problem | error | limit | CPU s | observed orders | default over the best of what costs no more |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name, entry in summary.items():
+        orders = ", ".join(
+            f"{setting} {order:.2f}" for setting, order in entry["orders"].items() if math.isfinite(order)
+        )
+        page.append(
+            f"| [{name}](#{name}) | {entry['error']:.2e} | {entry['limit']:.2g} | {entry['cpu_seconds']:.2f} |"
+            f" {orders or '-'} | {entry['excess']:.2f} |"
+        )
+    for name, mine in by_name.items():
+        page += _section(problems[name], mine, folder)
+    (folder / "accuracy.md").write_text("\n".join(page) + "\n", encoding="utf-8")
+    data = dataset(rows)
+    data.attrs = {"title": "error against run time", "revision": revision(), "created": f"{datetime.now(UTC):%Y-%m-%d}"}
+    data.to_netcdf(folder / "accuracy.nc", engine="h5netcdf")
+    return {"page": str(folder / "accuracy.md"), "data": str(folder / "accuracy.nc"), "problems": summary}
+
+
+def origin() -> str:
+    """When, with which revision and on which machine a page is made, as half a sentence."""
+    return (
+        f"on {datetime.now(UTC):%Y-%m-%d}: revision {revision() or 'unknown'}, {os.cpu_count()} cores,"
+        f" {platform.machine()}, Python {platform.python_version()}"
+    )
+
+
+def _summary(rows, problem):
+    verdict = assess(rows)
+    default = rows[0]
+    return {
+        "error": default["error"],
+        "limit": problem.limit,
+        "within": bool(default["error"] <= problem.limit),
+        "cpu_seconds": default["cpu_seconds"],
+        "orders": verdict["orders"],
+        "excess": verdict["excess"],
+    }
+
+
+def _section(problem, rows, folder):
+    lines = [
+        "",
+        f"## {problem.name}",
+        "",
+        f"{problem.title}. Reference: {problem.source}. Error: {problem.norm}. Limit {problem.limit:g}: {problem.why}",
+    ]
+    if len(rows) > 1:
+        figures.save(
+            figures.problem_figure(problem.title, problem.norm, rows),
+            folder / "images" / f"accuracy-{problem.name}.png",
+        )
+        lines += ["", f"![{problem.name}](images/accuracy-{problem.name}.png)"]
+    front = assess(rows)["front"]
+    lines += [
+        "",
+        "| setting | value | error | CPU s | steps | points | on the front |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for row, best in zip(rows, front, strict=True):
+        if row["failure"]:
+            lines.append(f"| {row['setting']} | {row['value']} | failed: {row['failure']} | | | | |")
+            continue
+        value = ", ".join(f"{k} = {v}" for k, v in problem.fast.items()) if row["value"] is None else row["value"]
+        lines.append(
+            f"| {row['setting']} | {value} | {row['error']:.2e} | {row['cpu_seconds']:.2f} | {row['steps']} |"
+            f" {row['points']} | {'yes' if best else ''} |"
+        )
+    return lines
