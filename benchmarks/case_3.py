@@ -33,7 +33,7 @@ PICTURES = ("fields", "pressures", "internal_forces", "inflow")
 
 WHY_NOT = (
     "Within two metres of the gate the pressure falls to zero over three or four elements, so neighbours differ by a",
-    "third of the local value whatever the method; how far they lie off the plane through their neighbours is the noise.",
+    "third of the local value whatever the method; what they lie off the plane through their neighbours is the noise.",
     "",
 )
 

@@ -51,6 +51,7 @@ def run_command(
     """
     with _failures(), _checked_json(json_path):
         from coupling.datasets import RunFileError, read_response
+        from coupling.quality import quality_line
         from coupling.run import run
         from coupling.run_folder import FIGURES
         from coupling.scene import load_scene
@@ -62,6 +63,7 @@ def run_command(
         data = {"run": str(folder), **summarise_run(folder), "response": None}
         with contextlib.suppress(RunFileError):
             data["response"] = summarise_response(read_response(folder))
+            data["quality"]["lining_equilibrium"] = data["response"]["equilibrium_residual"]
         data["figures"] = sorted(str(path) for path in (folder / FIGURES).glob("*.png"))
         _write_json(json_path, data)
         if not quiet and str(json_path) != "-":
@@ -69,6 +71,7 @@ def run_command(
             console.print(_run_table(data))
             if data["response"]:
                 console.print(_response_table(data["response"]))
+            console.print(f"errors: {quality_line(data['quality'])}", highlight=False)
             console.print(f"results in {folder}", highlight=False, soft_wrap=True)
 
 
@@ -388,7 +391,6 @@ def _run_table(data):
             rows.append((f"{label}, {place}", f"{values['initial'] / 1e3:.0f} -> {values['final'] / 1e3:.0f} kPa"))
     rows += [
         ("steps, mean dt", f"{data['steps']}, {1e6 * data['mean_dt']:.0f} µs ({data['dt_limit']})"),
-        ("grain mass error", f"{data['grain_mass_error']:.1e}"),
         ("point-steps per CPU second", f"{data['point_steps_per_cpu_second'] / 1e6:.1f} million"),
         ("wall, CPU time", f"{data['wall_seconds']:.0f} s, {data['cpu_seconds']:.0f} s"),
     ]

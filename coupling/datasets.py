@@ -32,6 +32,18 @@ PROGRESS = {
     "flow_zone_area": ("m2", "area of soil displaced by more than 50 mm"),
     "disturbed_area": ("m2", "area of soil displaced by 10 to 50 mm"),
 }
+#: Of these the balances: see :meth:`mpm.Solver.balances`.
+BALANCES = {
+    "momentum_error": ("1", "momentum of the points less what the nodes received, over the impulse of gravity"),
+    "water_mass_error": ("1", "change of the mass of the water, over the initial mass"),
+    "work_gravity": ("J m-1", "work of gravity on grains and water since the gate opened"),
+    "work_stress": ("J m-1", "work of stresses and pore pressure since the gate opened, positive where it accelerates"),
+    "work_drag": ("J m-1", "work of the drag between water and grains since the gate opened"),
+    "kinetic_energy_change": ("J m-1", "change of the kinetic energy of grains and water since the gate opened"),
+    "transfer_loss": ("J m-1", "kinetic energy lost between points and nodes since the gate opened"),
+    "contact_error": ("1", "momentum at the lining that the recorded reactions do not explain, over their sum"),
+    "largest_courant": ("1", "largest time step so far over the critical one of the state it led to"),
+}
 #: Variables on (time,) of `/history`.
 HISTORY = {
     **PROGRESS,
@@ -39,6 +51,7 @@ HISTORY = {
     "suspended_fraction": ("1", "share of points whose grains do not touch"),
     "kinetic_energy": ("J m-1", "kinetic energy of the grains"),
     "max_velocity": ("m s-1", "largest velocity of the grains"),
+    **BALANCES,
     "dt": ("s", "mean time step in the interval"),
     "steps": ("1", "time steps since the gate opened"),
     "point_steps": ("1", "updates of one point by one step since the gate opened"),
@@ -231,6 +244,8 @@ class RunWriter:
         for name in HISTORY:
             if name.startswith("clamp_"):
                 values = [record.clamp_counts.get(name.removeprefix("clamp_"), 0) for record in batch]
+            elif name in BALANCES:
+                values = [record.balances[name] for record in batch]
             elif name == "dt_limit":
                 values = [_limit_flag(record.dt_limit) for record in batch]
             else:

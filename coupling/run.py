@@ -4,8 +4,9 @@ import contextlib
 import logging
 import time as clock
 
-from coupling.datasets import RunWriter, read_pressures, write_response
+from coupling.datasets import RunWriter, read_history, read_pressures, write_attributes, write_response
 from coupling.provenance import root_attributes
+from coupling.quality import quality, quality_attributes, quality_line
 from coupling.run_folder import (
     FIGURES,
     LOG_FILE,
@@ -74,7 +75,9 @@ def finish(scene, folder, progress):
 
     if scene.ring is not None and scene.mpm.tunnels:
         progress({"stage": "respond"})
-        write_response(folder / RUN_FILE, respond(scene, read_pressures(folder)))
+        response = respond(scene, read_pressures(folder))
+        write_response(folder / RUN_FILE, response)
+        _write_quality(folder / RUN_FILE, response)
     progress({"stage": "figures"})
     return draw_run(folder, folder / FIGURES)
 
@@ -144,8 +147,11 @@ def _simulate(scene, folder, report, threads):
     log.info("mesh: %s", ", ".join(f"{name} {value:.4g}" for name, value in mesh.quality.items()))
     writer = RunWriter(folder / RUN_FILE, attributes, scene.mpm, mesh)
 
-    def used():
-        return {"wall_seconds": clock.monotonic() - wall, "cpu_seconds": clock.process_time() - cpu}
+    def close(status, message=""):
+        writer.close(
+            status, message, wall_seconds=clock.monotonic() - wall, cpu_seconds=clock.process_time() - cpu,
+        )  # fmt: skip
+        _write_quality(folder / RUN_FILE)
 
     try:
         for record in mpm.simulate(scene.mpm, mesh, threads, report):
@@ -156,19 +162,27 @@ def _simulate(scene, folder, report, threads):
             )
     except mpm.RunFailed as failure:
         log.error("failed: %s", failure)
-        writer.close("failed", str(failure), **used())
+        close("failed", str(failure))
         failure.add_note(f"what was computed until then is in {folder}")
         raise
     except KeyboardInterrupt:
         log.warning("interrupted")
-        writer.close("interrupted", "stopped by the user", **used())
+        close("interrupted", "stopped by the user")
         raise
     except BaseException as error:
         log.exception("failed")
-        writer.close("failed", f"{type(error).__name__}: {error}", **used())
+        close("failed", f"{type(error).__name__}: {error}")
         raise
-    writer.close("finished", **used())
+    close("finished")
     log.info("finished in %.1f s", clock.monotonic() - wall)
+
+
+def _write_quality(file, response=None):
+    history = read_history(file)
+    if history.sizes["time"]:
+        values = quality(history, response)
+        write_attributes(file, **quality_attributes(values))
+        log.info("quality: %s", quality_line(values))
 
 
 @contextlib.contextmanager

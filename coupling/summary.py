@@ -3,6 +3,7 @@
 import numpy as np
 
 from coupling.datasets import read_attributes, read_history, read_pressures
+from coupling.quality import quality
 from mpm.variables import CLAMPS
 
 PLACES = {"crown": 0, "right waist": 90, "invert": 180, "left waist": 270}
@@ -17,7 +18,8 @@ def summarise_run(run):
         scene, status, status_message; records; time [s]; inflow_mass [kg/m]; flow_zone_area, disturbed_area [m2];
         steps; point_steps; mean_dt [s]; dt_limit; max_velocity [m/s]; grain_mass_error [-]: largest relative
         departure from the initial grain mass; wall_seconds, cpu_seconds, point_steps_per_cpu_second; clamps: updates
-        at which each limit acted; soil_pressure, water_pressure [Pa]: place to {initial, final}.
+        at which each limit acted; quality: see :func:`coupling.quality.quality`; soil_pressure, water_pressure [Pa]:
+        place to {initial, final}.
     """
     attributes, history, pressures = read_attributes(run), read_history(run), read_pressures(run)
     data = {
@@ -45,6 +47,7 @@ def summarise_run(run):
         "dt_limit": limits[int(last["dt_limit"])],
         "grain_mass_error": float(np.max(np.abs(mass / mass[0] - 1))),
         "clamps": {name: int(last[f"clamp_{name}"]) for name in CLAMPS},
+        "quality": quality(history),
     }
     if "soil_pressure" in pressures:
         if "tunnel" in pressures.dims:

@@ -77,7 +77,7 @@ def wall_normal(b_s, b_l, ms, ml, mn, d, dt):
 @kernel
 def solve_nodes(
     first, last, sums, dt, gravity, density_liquid, fixed, contact_of_node,
-    normal, active, friction, nodes, status, impulse,
+    normal, active, friction, nodes, status, impulse, ledger,
 ):  # fmt: skip
     """Add up the parts of a range of nodes and advance both phases by dt.
 
@@ -96,7 +96,10 @@ def solve_nodes(
     impulse : (n_contact, 5) float64
         Added: dt times effective normal, water normal, tangential reaction [N s/m], the latter along
         (ny, -nx) on the material, and dt times the squares of the first two.
+    ledger : (8,) float64
+        Added: see :data:`mpm.variables.LEDGER`.
     """
+    px = py = kinetic = by_gravity = by_drag = by_stress = unfelt = reactions = 0.0
     for i in range(first, last):
         ms = ml = mn = dd = psx = psy = plx = ply = q = fx = fy = flx = fly = 0.0
         for part in range(sums.shape[0]):
@@ -125,6 +128,7 @@ def solve_nodes(
             row[V_DSX] = row[V_DSY] = row[V_DLX] = row[V_DLY] = 0.0
             continue
         row[V_P] += q * density_liquid / ml
+        grid_x, grid_y, water_x, water_y = fx, fy, flx, fly  # of stresses alone
         fy -= (ms + mn) * gravity
         fly -= ml * gravity
         ux, uy, wx, wy = psx / ms, psy / ms, plx / ml, ply / ml
@@ -162,6 +166,10 @@ def solve_nodes(
             impulse[c, 2] += dt * shear
             impulse[c, 3] += dt * r_s * r_s
             impulse[c, 4] += dt * r_l * r_l
+            # change of the momentum that reactions, stress and weight do not make up
+            unfelt += abs(ms * vsx + mn * vlx - bsx - dt * (nx * (r_s + r_l) + ny * shear))
+            unfelt += abs(ms * vsy + mn * vly - bsy - dt * (ny * (r_s + r_l) - nx * shear))
+            reactions += dt * (r_s + r_l)
         else:
             vsx, vlx = free_pair(bsx, blx, ms, ml, mn, d)
             vsy, vly = free_pair(bsy, bly, ms, ml, mn, d)
@@ -172,14 +180,33 @@ def solve_nodes(
         row[V_SX], row[V_SY], row[V_LX], row[V_LY] = vsx, vsy, vlx, vly
         row[V_DSX], row[V_DSY] = vsx - ux, vsy - uy
         row[V_DLX], row[V_DLY] = vlx - wx, vly - wy
+        # mean velocities of the step: with them work is the change of kinetic energy, whatever the time step
+        sx, sy, lx, ly = 0.5 * (ux + vsx), 0.5 * (uy + vsy), 0.5 * (wx + vlx), 0.5 * (wy + vly)
+        share = mn / ml
+        px += ms * (vsx - ux) + mn * (vlx - wx)
+        py += ms * (vsy - uy) + mn * (vly - wy)
+        kinetic += ms * (sx * (vsx - ux) + sy * (vsy - uy)) + mn * (lx * (vlx - wx) + ly * (vly - wy))
+        by_gravity -= dt * gravity * (ms * sy + mn * ly)
+        by_drag += share * d * ((vlx - vsx) * (sx - lx) + (vly - vsy) * (sy - ly))
+        by_stress += dt * (sx * (grid_x - share * water_x) + sy * (grid_y - share * water_y))
+        by_stress += dt * share * (lx * water_x + ly * water_y)
+    ledger[0] += px
+    ledger[1] += py
+    ledger[2] += kinetic
+    ledger[3] += by_gravity
+    ledger[4] += by_drag
+    ledger[5] += by_stress
+    ledger[6] += unfelt
+    ledger[7] += reactions
 
 
 @kernel
 def solve_dry_nodes(
     first, last, sums, dt, gravity, density_liquid, fixed, contact_of_node,
-    normal, active, friction, nodes, status, impulse,
+    normal, active, friction, nodes, status, impulse, ledger,
 ):  # fmt: skip
     """`solve_nodes` for dry soil: one momentum equation a node; the water's columns are not touched."""
+    sum_x = sum_y = kinetic = by_gravity = by_stress = unfelt = reactions = 0.0
     for i in range(first, last):
         ms = px = py = fx = fy = 0.0
         for part in range(sums.shape[0]):
@@ -199,6 +226,7 @@ def solve_dry_nodes(
         ux, uy = px / ms, py / ms
         px += dt * fx
         py += dt * (fy - ms * gravity)
+        free_x, free_y = px, py
         c = contact_of_node[i]
         if c >= 0 and active[c]:
             nx, ny = normal[c, 0], normal[c, 1]
@@ -218,7 +246,10 @@ def solve_dry_nodes(
                 impulse[c, 0] += dt * reaction
                 impulse[c, 2] += dt * shear
                 impulse[c, 3] += dt * reaction * reaction
-            px, py = nx * pn + ny * pt, ny * pn - nx * pt
+                px, py = nx * pn + ny * pt, ny * pn - nx * pt
+                unfelt += abs(px - free_x - dt * (nx * reaction + ny * shear))
+                unfelt += abs(py - free_y - dt * (ny * reaction - nx * shear))
+                reactions += dt * reaction
         vx, vy = px / ms, py / ms
         if fixed[i] & FIXED_X:
             vx = 0.0
@@ -226,6 +257,19 @@ def solve_dry_nodes(
             vy = 0.0
         row[V_SX], row[V_SY] = vx, vy
         row[V_DSX], row[V_DSY] = vx - ux, vy - uy
+        sx, sy = 0.5 * (ux + vx), 0.5 * (uy + vy)
+        sum_x += ms * (vx - ux)
+        sum_y += ms * (vy - uy)
+        kinetic += ms * (sx * (vx - ux) + sy * (vy - uy))
+        by_gravity -= dt * gravity * ms * sy
+        by_stress += dt * (sx * fx + sy * fy)
+    ledger[0] += sum_x
+    ledger[1] += sum_y
+    ledger[2] += kinetic
+    ledger[3] += by_gravity
+    ledger[5] += by_stress
+    ledger[6] += unfelt
+    ledger[7] += reactions
 
 
 @cache

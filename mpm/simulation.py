@@ -20,6 +20,7 @@ class Record:
     Pressures [Pa], compression positive; `lining` has one dict a tunnel with theta [degrees from the
     crown, clockwise], arc [m], soil_pressure (effective), water_pressure, soil_shear (clockwise
     traction on the lining) and the standard deviation of the first two within the interval.
+    `balances` are those of :meth:`mpm.Solver.balances`.
     """
 
     time: float
@@ -35,6 +36,7 @@ class Record:
     kinetic_energy: float
     max_velocity: float
     clamp_counts: dict
+    balances: dict
     point_steps: int
     cpu_seconds: float
     points: dict | None
@@ -82,6 +84,7 @@ def simulate(scene, mesh=None, threads=None, progress=None):
             steps=solver.step_count,
             lining=solver.lining_pressures(duration),
             clamp_counts=dict(zip(CLAMPS, solver.clamps.sum(axis=0).tolist(), strict=True)),
+            balances=solver.balances(),
             point_steps=solver.point_steps,
             cpu_seconds=clock.process_time() - cpu_start,
             points=solver.points_by_name() if snapshot else None,

@@ -15,6 +15,7 @@ from mpm.transfer import advance_kernel, rates_kernel, update_kernel
 from mpm.variables import (
     BUFFER_WIDTH,
     CLAMPS,
+    LEDGER,
     MASS,
     MODEL_ELASTIC,
     MODEL_MOHR_COULOMB,
@@ -26,6 +27,8 @@ from mpm.variables import (
     S_LAMBDA,
     SOIL_WIDTH,
     V_P,
+    VLX,
+    VLY,
     VSX,
     VSY,
     X0,
@@ -88,9 +91,12 @@ class Solver:
         self.threads = 1 if m < SMALLEST_PARALLEL else max(1, min(threads or cores, PARTS))
         self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
         self.clamps = np.zeros((PARTS, len(CLAMPS)), np.int64)
+        self.ledger = np.zeros((PARTS, len(LEDGER)))
+        self.largest_courant = 0.0
         self.time, self.step_count, self.point_steps = 0.0, 0, 0
         self.initial_volume = self._volumes()
         self.initial_grain_mass = float(np.sum(self.points[:, MASS]))
+        self.initial = self.sums_over_points()
         self._spare = self.start.copy(), self.order.copy()
         self._moved = np.zeros(len(self.points), np.int32), np.zeros(len(self.points), np.int32)
         self._sort()
@@ -345,7 +351,7 @@ class Solver:
             dt, limit = dt_max, "output"
         self.over_nodes(
             self._solve_nodes, self.sums, dt, self.scene.gravity, density, *wall, self.friction, self.nodes,
-            self.status, self.impulse,
+            self.status, self.impulse, per_range=(self.ledger,),
         )  # fmt: skip
         self.over_elements(
             self._advance_points, *layout, density, *grid, dt, math.exp(-numerics.pic_rate * dt),
@@ -356,6 +362,7 @@ class Solver:
         outcome = self._update_points(dt, True)
         self._check(outcome)
         self._limits = [o[3:] for o in outcome]
+        self.largest_courant = max(self.largest_courant, dt / min(self._limits)[0])
         self.suspended = sum(o[2] for o in outcome)
         if any(o[0] for o in outcome):
             self._relocate()
@@ -404,6 +411,59 @@ class Solver:
         r2 = (self.points[:, X] - tunnel.x) ** 2 + (self.points[:, Y] + tunnel.axis_depth) ** 2
         inside = (r2 < tunnel.inner_radius**2) & (self.element_of_point >= 0)
         return float(np.sum(self.points[inside, MASS])) + self.removed_mass
+
+    def sums_over_points(self):
+        """Momentum (x, y) [N s] and kinetic energy [J] of grains and water, mass of the water [kg], per metre.
+
+        Points taken out are left out. Water is counted with its compression, or with what is missing of it.
+        """
+        rows = self.points[self.element_of_point >= 0]
+        mass = rows[:, MASS]
+        momentum = mass @ rows[:, [VSX, VSY]]
+        kinetic = 0.5 * float(mass @ (rows[:, VSX] ** 2 + rows[:, VSY] ** 2))
+        water = 0.0
+        if self.scene.water is not None:
+            volume = self._volumes()[self.element_of_point >= 0]
+            wet = self._water_density * rows[:, N] * volume
+            momentum = momentum + wet @ rows[:, [VLX, VLY]]
+            kinetic += 0.5 * float(wet @ (rows[:, VLX] ** 2 + rows[:, VLY] ** 2))
+            water = float(wet.sum())
+            if self._water_modulus > 0:
+                water += float(wet @ rows[:, P]) / self._water_modulus
+        return {"momentum": momentum, "kinetic": kinetic, "water": water}
+
+    def balances(self):
+        """How far the state of the points is from what was done to them, as a dict of floats.
+
+        Returns
+        -------
+        dict
+            momentum_error [-]: departure of the points' momentum from what the nodes received, over the impulse of
+            gravity; water_mass_error [-]: change of the water's mass over the initial; work_gravity, work_stress,
+            work_drag, kinetic_energy_change, transfer_loss [J/m]: energies since the start, the last what the way from
+            points to nodes and back (PIC, MUSL) took; contact_error [-]: change of the momentum at the lining that the
+            recorded reactions do not explain, over their sum; largest_courant [-]: time step over the critical one of
+            the state it led to.
+
+        With a sink momentum, energy and water leave with the points taken out, and count as errors.
+        """
+        ledger, now = dict(zip(LEDGER, self.ledger.sum(axis=0).tolist(), strict=True)), self.sums_over_points()
+        received = np.array([ledger["momentum_x"], ledger["momentum_y"]])
+        departure = float(np.abs(now["momentum"] - self.initial["momentum"] - received).max())
+        weight = self.scene.gravity * (self.initial_grain_mass + self.initial["water"]) * self.time
+        change = now["kinetic"] - self.initial["kinetic"]
+        water = self.initial["water"]
+        return {
+            "momentum_error": departure / weight if weight > 0 else 0.0,
+            "water_mass_error": now["water"] / water - 1 if water > 0 else 0.0,
+            "work_gravity": ledger["gravity"],
+            "work_stress": ledger["stress"],
+            "work_drag": ledger["drag"],
+            "kinetic_energy_change": change,
+            "transfer_loss": ledger["kinetic"] - change,
+            "contact_error": ledger["unexplained"] / ledger["reactions"] if ledger["reactions"] > 0 else 0.0,
+            "largest_courant": self.largest_courant,
+        }
 
     def measures(self):
         """Zones, balances and extremes of the state at hand, as a dict of floats."""

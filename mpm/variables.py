@@ -53,3 +53,8 @@ CLAMPS = ("tension", "suspended", "cavitated", "porosity_floor", "porosity_ceili
 (C_TENSION, C_SUSPENDED, C_CAVITATED, C_FLOOR, C_CEILING, C_RETURNED) = range(len(CLAMPS))
 POROSITY_FLOOR = 0.05
 POROSITY_CEILING = 0.90
+
+# What the nodes add up over all steps, per metre of tunnel: change of the momentum (x, y) [N s], change of the kinetic
+# energy of grains and water [J], work of gravity, drag and stresses on them [J], part of the momentum's change at the
+# lining that no recorded reaction explains, and the reactions it is compared with [N s].
+LEDGER = ("momentum_x", "momentum_y", "kinetic", "gravity", "drag", "stress", "unexplained", "reactions")

@@ -3,6 +3,7 @@
 import numpy as np
 
 import coupling
+from coupling.datasets import BALANCES
 from mpm.simulation import Record
 from mpm.variables import CLAMPS, POINT_VARIABLES
 
@@ -58,6 +59,7 @@ def record(time, n_tunnels=1, snapshot=False):
         suspended_fraction=0.01 * time,
         kinetic_energy=10.0 * time,
         max_velocity=time,
+        balances={name: 1e-6 * k for k, name in enumerate(BALANCES)},
         clamp_counts={name: k for k, name in enumerate(CLAMPS)},
         point_steps=int(time * 1e8),
         cpu_seconds=time,

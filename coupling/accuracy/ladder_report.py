@@ -25,7 +25,7 @@ def write_ladder(ladder, name: str, runs: list[dict], folder: Path) -> dict:
         "",
         f"Made by `gush accuracy --scene {name}` {origin()}. Every mesh length is multiplied by a factor; states are",
         "compared at equal inflow mass. Meshes of nearly one size show what the arrangement of elements alone does.",
-        "Value at size zero: straight line in mesh size, least squares (linear triangles have stresses of first order).",
+        "Value at size zero: straight line in mesh size, least squares (stresses of linear triangles: first order).",
         "Error bar: the larger of its distance from the finest mesh and twice the standard error of the fit. Pressures",
         "are means over ten degrees to either side.",
         "",
