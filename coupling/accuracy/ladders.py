@@ -9,7 +9,11 @@ from coupling.accuracy.orders import excess_over_front, observed_order, pareto_f
 from coupling.verification.problem import Problem
 
 #: Settings that count something: their mesh size or time step is one over the value.
-COUNTS = ("cells", "elements", "columns", "rows", "across", "steps", "points_per_element")
+COUNTS = ("cells", "elements", "columns", "rows", "across", "steps", "increments", "points_per_element", "points")
+#: Settings that are a mesh size or a time step.
+SIZES = ("size", "element_size", "spacing", "courant", "dt", "time_step")
+#: Errors at or below this are round-off: nothing can be gained there.
+ROUND_OFF = 1e-12
 
 
 def measure(problem: Problem, only_fast: bool = False, progress: Callable[[str], None] | None = None) -> list[dict]:
@@ -75,26 +79,37 @@ def assess(rows: Iterable[dict]) -> dict:
     Returns
     -------
     dict
-        orders : setting to the observed order over mesh size or time step (NaN where values are no numbers);
-        front : (n_rows,) bool;  excess : error of the default over the best error of what costs no more.
+        orders : setting that is a mesh size, a time step or a count to the observed order;  front : (n_rows,) bool,
+        among numerical choices only: another friction angle is another problem, not a cheaper method;  excess : error
+        of the default over the best error of what costs no more, 1 where it is round-off.
     """
     rows = list(rows)
-    known = [k for k, row in enumerate(rows) if math.isfinite(row["error"])]
+    physical = physical_settings()
+    known = [k for k, row in enumerate(rows) if math.isfinite(row["error"]) and row["setting"] not in physical]
     front = [False] * len(rows)
     if known:
         for k, best in zip(known, pareto_front(*_costs(rows, known)), strict=True):
             front[k] = bool(best)
     orders = {}
     for setting in dict.fromkeys(row["setting"] for row in rows if row["value"] is not None):
-        mine = [row for row in rows if row["setting"] == setting]
-        numbers = [row["value"] for row in mine]
-        if not all(isinstance(number, int | float) and not isinstance(number, bool) for number in numbers):
+        if setting not in (*COUNTS, *SIZES):
             continue
+        mine = [row for row in rows if row["setting"] == setting and row["error"] > ROUND_OFF]
+        numbers = [row["value"] for row in mine]
         sizes = [(1 / n if setting in COUNTS else n) if n > 0 else math.nan for n in numbers]
         orders[setting] = observed_order(sizes, [row["error"] for row in mine])
     first = next((k for k, i in enumerate(known) if rows[i]["setting"] == "default"), None)
     excess = math.nan if first is None else excess_over_front(*_costs(rows, known), first)
+    if first is not None and rows[known[first]]["error"] <= ROUND_OFF:
+        excess = 1.0
     return {"orders": orders, "front": front, "excess": excess}
+
+
+def physical_settings() -> set[str]:
+    """Names of settings that are parameters of soil and water, not numerical choices; K_w is both and stays out."""
+    from mpm.scene import Soil, Water
+
+    return {*Soil.model_fields, *Water.model_fields} - {"bulk_modulus"}
 
 
 def _costs(rows, known):
