@@ -15,6 +15,8 @@ _HOMES = {
     "scene_names": "coupling.scene",
     "run": "coupling.run",
     "read_run": "coupling.datasets",
+    "study": "coupling.studies.execute",
+    "read_study": "coupling.studies.collect",
 }
 
 __all__ = sorted(_HOMES)

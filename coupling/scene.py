@@ -108,7 +108,18 @@ def load_scene(name: str | Path, **changes: Any) -> Scene:
     SceneError
         Unknown name, unreadable file, or invalid values; every mistake found is named.
     """
-    return make_scene(_merge(_read(str(name), ()), changes), str(name))
+    return make_scene(_merge(read_scene_data(name), changes), str(name))
+
+
+def read_scene_data(name: str | Path) -> dict[str, Any]:
+    """The nested dictionary of a scene, its bases merged, before validation; for :func:`make_scene`.
+
+    Raises
+    ------
+    SceneError
+        Unknown name or unreadable file.
+    """
+    return _read(str(name), ())
 
 
 def make_scene(data: dict[str, Any], origin: str = "scene") -> Scene:

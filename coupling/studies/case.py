@@ -1,0 +1,155 @@
+"""One case of a study: run, answered by the lining models, taken at fixed inflow masses; made to run anywhere."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+#: In a case's folder: what of it goes into the study's dataset, written last, so it exists only when all is done.
+CASE_FILE = "case.nc"
+RUN_FOLDER = "run"
+#: Quantities over time that a case keeps besides pressures and response.
+PROGRESS = ("time", "flow_zone_area", "disturbed_area", "suspended_fraction", "max_velocity")
+
+
+def run_case(source: str, folder: str, backends: tuple[str, ...], records: int) -> str:
+    """Run one scene and write its `case.nc`; at once where that exists.
+
+    Parameters
+    ----------
+    source : str
+        TOML of the complete scene.
+    folder : str
+        The case's own; made when absent. What a killed run left there is replaced.
+    backends : tuple of str
+        Lining models.
+    records : int
+        Number of inflow masses.
+
+    Returns
+    -------
+    str
+        Path of the file.
+
+    Raises
+    ------
+    mpm.RunFailed, structure.LiningFailure, coupling.run_folder.RunRefused
+        As :func:`coupling.run`; the study goes on without the case.
+    """
+    import tomllib
+
+    from coupling.datasets import read_history, read_pressures, write_response
+    from coupling.run import respond, run
+    from coupling.run_folder import RUN_FILE
+    from coupling.scene import make_scene
+
+    place = Path(folder)
+    done = place / CASE_FILE
+    if done.is_file():
+        return str(done)
+    scene = make_scene(tomllib.loads(source), str(place))
+    place.mkdir(parents=True, exist_ok=True)
+    run_folder = place / RUN_FOLDER
+    run(scene, run_folder, overwrite=True, threads=1)
+    pressures, history = read_pressures(run_folder), read_history(run_folder)
+    if "tunnel" in pressures.dims:
+        pressures = pressures.isel(tunnel=scene.mpm.gate.tunnel if scene.mpm.gate else 0, drop=True)
+    responses = {}
+    for name in backends if scene.ring is not None else ():
+        responses[name] = respond(scene, pressures, name)
+        write_response(run_folder / RUN_FILE, responses[name], name)
+    last = scene.mpm.stop.inflow_mass or float(history["inflow_mass"].values[-1])
+    result = at_inflow_masses(pressures, history, responses, np.linspace(0.0, last, records))
+    result.attrs["scene"] = source
+    waiting = place / f"{CASE_FILE}.{os.getpid()}"
+    result.to_netcdf(waiting, engine="h5netcdf")
+    waiting.replace(done)
+    return str(done)
+
+
+def at_inflow_masses(pressures, history, responses, masses):
+    """States of a run at fixed inflow masses; NaN beyond what the run reached.
+
+    Parameters
+    ----------
+    pressures, history : xarray.Dataset
+        Of the run, one tunnel.
+    responses : dict of str to xarray.Dataset
+        By lining model.
+    masses : (n,) float64
+        [kg/m], ascending from 0, the initial state.
+
+    Returns
+    -------
+    xarray.Dataset
+        Pressures (progress, theta); time, zones and so on (progress); variables of the responses with a dimension
+        `model`, angles as `theta_ring`; `inflow_mass` (progress) [kg/m]; progress from 0 to 1 is the share of the last
+        inflow mass, so that cases of different stops stack. cpu_seconds, quality numbers as scalars.
+    """
+    import xarray as xr
+
+    from coupling.datasets import BALANCES
+    from coupling.quality import quality
+
+    reached, unique = _times(history, masses)
+    parts = [_at(pressures[["soil_pressure", "water_pressure", "soil_shear"]], reached)]
+    parts.append(_at(history[[name for name in PROGRESS if name != "time" and name in history]], reached))
+    if responses:
+        keep = [name for name in next(iter(responses.values())).data_vars if name not in ("inflow_mass", "theta_bnds")]
+        # pressures are means over whole degrees, section forces belong to the beams between them
+        models = [_at(response[keep], reached).rename(theta="theta_ring") for response in responses.values()]
+        parts.append(xr.concat(models, dim=xr.IndexVariable("model", list(responses)), join="outer"))
+    result = xr.merge(parts, compat="no_conflicts", join="outer")
+    result["time"] = (
+        "progress",
+        np.where(unique, reached, np.nan),
+        {"units": "s", "long_name": "time since the gate opened"},
+    )
+    result = result.assign_coords(
+        progress=(
+            "progress",
+            masses / max(masses[-1], 1e-300),
+            {"units": "1", "long_name": "share of the last inflow mass"},
+        ),
+        inflow_mass=("progress", masses, {"units": "kg m-1", "long_name": "grains inside the tunnel"}),
+    )
+    result["cpu_seconds"] = (
+        (),
+        float(history["cpu_seconds"].values[-1]),
+        {"units": "s", "long_name": "processor time"},
+    )
+    values = quality(history, next(iter(responses.values()), None)) if set(BALANCES) <= set(history) else {}
+    for name, value in values.items():
+        if name != "clamps":
+            result[f"quality_{name}"] = ((), float(value), {"units": "1", "long_name": name.replace("_", " ")})
+    return result
+
+
+def _times(history, masses):
+    """Time at which each inflow mass was first reached, and whether it was."""
+    inflow, time = history["inflow_mass"].values, history["time"].values
+    highest = np.maximum.accumulate(inflow)
+    known = masses <= highest[-1] * (1 + 1e-12)
+    reached = np.empty(len(masses))
+    for k, mass in enumerate(masses):
+        after = int(np.argmax(highest >= mass * (1 - 1e-12))) if known[k] else len(time) - 1
+        if after == 0 or not known[k]:
+            reached[k] = time[after]
+            continue
+        share = (mass - highest[after - 1]) / max(highest[after] - highest[after - 1], 1e-300)
+        reached[k] = time[after - 1] + min(share, 1.0) * (time[after] - time[after - 1])
+    return np.where(known, reached, np.nan), known
+
+
+def _at(dataset, times):
+    """A dataset at some times, NaN where the time is NaN, with the dimension `progress` in place of time."""
+    import xarray as xr
+
+    points = xr.DataArray(np.nan_to_num(times, nan=float(dataset["time"][0])), dims="progress")
+    there = xr.DataArray(np.isfinite(times), dims="progress")
+    picked = dataset.interp(time=points, assume_sorted=True).where(there)
+    for name in picked.data_vars:
+        picked[name].attrs = dict(dataset[name].attrs)
+    return picked.drop_vars("time")

@@ -1,0 +1,81 @@
+"""All cases of a study in one dataset."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from coupling.studies.design import Case, Study
+
+
+def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, str]):
+    """The cases' datasets along a dimension `case`, loaded when used.
+
+    Returns
+    -------
+    xarray.Dataset
+        Variables of :func:`coupling.studies.case.at_inflow_masses` with `case` in front; parameters as coordinates
+        (case) under their dotted names with `_` for `.`; `status` (case) "finished" or "failed", `message` (case);
+        failed cases are NaN. Attributes: `study`, its definition as JSON; `failed`, their number.
+    """
+    import xarray as xr
+
+    from coupling.studies.execute import case_file
+
+    there = [case for case in cases if case_file(folder, case).is_file()]
+    parts = []
+    for case in there:
+        part = xr.open_dataset(case_file(folder, case), engine="h5netcdf", chunks={}, decode_timedelta=False)
+        parts.append(part)
+    if parts:
+        result = xr.concat(
+            parts, dim=xr.IndexVariable("case", [case.index for case in there]), join="outer", data_vars="all",
+            coords=["inflow_mass"], compat="override", combine_attrs="drop_conflicts",
+        )  # fmt: skip
+        result = result.reindex(case=[case.index for case in cases])
+    else:
+        result = xr.Dataset(coords={"case": [case.index for case in cases]})
+    result["case"].attrs = {"units": "1", "long_name": "number of the case"}
+    for name in plan.parameters:
+        values = np.array([case.parameters[name] for case in cases])
+        result = result.assign_coords({name.replace(".", "_"): ("case", values, {"long_name": name})})
+    done = np.array([case in there for case in cases])
+    result["status"] = ("case", np.where(done, "finished", "failed"))
+    result["message"] = ("case", np.array([failures.get(case.key, "") for case in cases], dtype=str))
+    result.attrs = {
+        "Conventions": "CF-1.11",
+        "title": f"study {plan.name}",
+        "study": json.dumps(plan.model_dump(mode="json")),
+        "failed": int((~done).sum()),
+    }
+    return result
+
+
+def read_study(folder: str | Path):
+    """The dataset of a study that ran earlier.
+
+    Parameters
+    ----------
+    folder : str or path
+        As given to :func:`coupling.study`.
+
+    Raises
+    ------
+    coupling.studies.design.StudyError
+        No study there.
+    """
+    from coupling.studies.design import StudyError, cases, load_study
+    from coupling.studies.execute import STATUS_FILE, STUDY_FILE
+
+    folder = Path(folder)
+    try:
+        plan = load_study(json.loads((folder / STUDY_FILE).read_text(encoding="utf-8")))
+    except FileNotFoundError:
+        raise StudyError(f"study folder '{folder}': must hold {STUDY_FILE}, got none; run gush study first") from None
+    except ValueError as error:
+        raise StudyError(f"study folder '{folder}': {STUDY_FILE} must be that of a study, got: {error}") from None
+    status = json.loads((folder / STATUS_FILE).read_text(encoding="utf-8")) if (folder / STATUS_FILE).is_file() else {}
+    failures = {key: entry["message"] for key, entry in status.items() if entry["status"] == "failed"}
+    return collect(plan, cases(plan), folder, failures)

@@ -1,0 +1,246 @@
+"""What a study is: a base scene, parameters by their dotted names, and which combinations of them are run."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import math
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from coupling.scene import Scene, SceneError, make_scene, read_scene_data
+
+#: Changes when stored cases can no longer be used.
+FORMAT = "1"
+
+
+class StudyError(SceneError):
+    """A study that cannot be run: where, rule, value, remedy."""
+
+
+class Range(BaseModel):
+    """Values between `low` and `high`, spaced evenly or by their logarithm."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    low: float
+    high: float
+    scale: Literal["linear", "log"] = "linear"
+
+    @model_validator(mode="after")
+    def _check(self):
+        if not self.low < self.high:
+            raise ValueError(f"low must be below high, got {self.low:g} and {self.high:g}; swap them")
+        if self.scale == "log" and self.low <= 0:
+            raise ValueError(f"low must be above 0 on a log scale, got {self.low:g}; use scale = 'linear'")
+        return self
+
+    def at(self, share: float) -> float:
+        """Value at a share from 0 to 1 of the range."""
+        if self.scale == "log":
+            return math.exp(math.log(self.low) + share * math.log(self.high / self.low))
+        return self.low + share * (self.high - self.low)
+
+
+class Study(BaseModel):
+    """A study.
+
+    Parameters
+    ----------
+    name : str
+    scene : str
+        Built-in scene or TOML file that every case starts from; a parameter named "scene" replaces it.
+    design : {"factorial", "list", "latin-hypercube", "sobol"}
+        "factorial": all combinations of the listed values. "list": the first values of all lists, then the second,
+        and so on. The others sample ranges (scipy.stats.qmc).
+    parameters : dict
+        Dotted name of a scene's key, as "gate.angle" or "soils.0.porosity", to a list of values (factorial, list) or to
+        a table with low, high and scale (samples).
+    samples : int, optional
+        Number of cases of a sampled design; a power of two for "sobol".
+    seed : int
+        Of the samples: equal seeds give equal cases.
+    backends : tuple of str
+        Lining models that answer every case.
+    records : int
+        Number of inflow masses, from 0 to the stop's, at which cases are compared.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    name: str = Field(min_length=1, max_length=60, pattern=r"^[\w.-]+$")
+    scene: str = "quick"
+    design: Literal["factorial", "list", "latin-hypercube", "sobol"] = "factorial"
+    parameters: dict[str, tuple[Any, ...] | Range] = Field(min_length=1)
+    samples: int | None = Field(default=None, ge=2, le=100_000)
+    seed: int = 0
+    backends: tuple[str, ...] = ("beam-spring",)
+    records: int = Field(default=41, ge=2, le=10_000)
+
+    @model_validator(mode="after")
+    def _check(self):
+        sampled = self.design in ("latin-hypercube", "sobol")
+        for name, values in self.parameters.items():
+            if sampled != isinstance(values, Range):
+                wanted = "a table with low and high" if sampled else "a list of values"
+                raise ValueError(f"parameters.{name}: must be {wanted} in a {self.design} design, got {values!r}")
+            if not sampled and not values:
+                raise ValueError(f"parameters.{name}: must have at least one value, got none; add one or leave it out")
+        if sampled and self.samples is None:
+            raise ValueError(f"samples: must be given for a {self.design} design, got none; 16 is a start")
+        if not sampled and self.samples is not None:
+            raise ValueError(f"samples: a {self.design} design has as many cases as its lists say; leave samples out")
+        if self.design == "sobol" and self.samples & (self.samples - 1):
+            raise ValueError(
+                f"samples: must be a power of two in a sobol design, got {self.samples};"
+                f" use {2 ** (self.samples.bit_length())}"
+            )
+        lengths = {len(values) for values in self.parameters.values()} if self.design == "list" else {1}
+        if len(lengths) > 1:
+            raise ValueError(f"parameters: lists must be equally long in a list design, got lengths {sorted(lengths)}")
+        return self
+
+    def combinations(self) -> list[dict[str, Any]]:
+        """Value of every parameter in every case."""
+        names = list(self.parameters)
+        if self.design == "factorial":
+            return [dict(zip(names, values, strict=True)) for values in itertools.product(*self.parameters.values())]
+        if self.design == "list":
+            return [dict(zip(names, values, strict=True)) for values in zip(*self.parameters.values(), strict=True)]
+        from scipy.stats import qmc
+
+        if self.design == "sobol":
+            shares = qmc.Sobol(len(names), rng=self.seed).random(self.samples)
+        else:
+            shares = qmc.LatinHypercube(len(names), rng=self.seed).random(self.samples)
+        return [
+            {name: self.parameters[name].at(float(share)) for name, share in zip(names, row, strict=True)}
+            for row in shares
+        ]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One scene of a study: its parameters, and a key that is the same whenever the same would be computed."""
+
+    index: int
+    parameters: dict[str, Any]
+    scene: Scene
+    key: str
+
+
+def load_study(study: str | Path | dict | Study) -> Study:
+    """A study from a built-in name, a TOML file, a nested dictionary, or as it is.
+
+    Raises
+    ------
+    StudyError
+        Unknown name, unreadable file, or invalid values; every mistake found is named.
+    """
+    if isinstance(study, Study):
+        return study
+    origin = "study" if isinstance(study, dict) else f"study '{study}'"
+    data = study if isinstance(study, dict) else _read(str(study))
+    try:
+        return Study.model_validate(data)
+    except ValidationError as error:
+        lines = []
+        for item in error.errors():
+            where = ".".join(str(part) for part in item["loc"] if part not in ("tuple[any, ...]", "Range"))
+            lines.append(f"{where}: {item['msg'].removeprefix('Value error, ')}".removeprefix(": "))
+        raise StudyError("\n  ".join([f"{origin} has {len(lines)} mistake{'s' * (len(lines) > 1)}:", *lines])) from None
+
+
+def study_names() -> list[str]:
+    """Names of the built-in studies."""
+    files = resources.files("coupling") / "studies" / "ready"
+    return sorted(entry.name.removesuffix(".toml") for entry in files.iterdir() if entry.name.endswith(".toml"))
+
+
+def cases(study: Study) -> list[Case]:
+    """All cases of a study, validated before any of them runs.
+
+    Raises
+    ------
+    StudyError
+        A parameter that the scene does not have, or values that it refuses; the case is named.
+    """
+    result = []
+    for index, parameters in enumerate(study.combinations()):
+        changes = dict(parameters)
+        base = changes.pop("scene", study.scene)
+        try:
+            data = read_scene_data(base)
+            for name, value in changes.items():
+                data = _changed(data, name.split("."), value, name)
+            scene = make_scene(data, f"case {index}")
+        except SceneError as problem:
+            shown = ", ".join(f"{name} = {value}" for name, value in parameters.items())
+            raise StudyError(f"study '{study.name}', case {index} ({shown}): {problem}") from None
+        result.append(Case(index, parameters, scene, _key(scene, study)))
+    return result
+
+
+def _changed(data, path, value, name):
+    """A copy of nested dictionaries and lists with one value replaced."""
+    first, *rest = path
+    if isinstance(data, list | tuple):
+        if not first.isdigit() or int(first) >= len(data):
+            raise StudyError(
+                f"parameters.{name}: '{first}' must be a number below {len(data)}, the length of that list; as in"
+                " soils.0.porosity"
+            )
+        copy = list(data)
+        copy[int(first)] = _changed(copy[int(first)], rest, value, name) if rest else value
+        return copy
+    if not isinstance(data, dict):
+        raise StudyError(f"parameters.{name}: '{first}' must lie in a table or list, got {data!r}; shorten the name")
+    copy = dict(data)
+    copy[first] = _changed(copy.get(first, {}), rest, value, name) if rest else value
+    return copy
+
+
+@cache
+def _code() -> str:
+    """Hash of the sources that decide a result: `mpm`, `structure`, and what turns a run into a case."""
+    total = hashlib.sha256(FORMAT.encode())
+    for package in ("mpm", "structure", "coupling.studies.case", "coupling.run", "coupling.datasets"):
+        origin = Path(find_spec(package).origin)
+        for file in sorted(origin.parent.rglob("*.py")) if origin.name == "__init__.py" else [origin]:
+            total.update(file.read_bytes())
+    return total.hexdigest()
+
+
+def _key(scene: Scene, study: Study) -> str:
+    text = "\n".join([_code(), scene.source, ",".join(study.backends), str(study.records)])
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _read(name: str) -> dict[str, Any]:
+    try:
+        if name in study_names():
+            text = (resources.files("coupling") / "studies" / "ready" / f"{name}.toml").read_text(encoding="utf-8")
+        else:
+            text = Path(name).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        import difflib
+
+        near = difflib.get_close_matches(name, study_names(), 1)
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        raise StudyError(
+            f"study {name!r}: must be a built-in study or a file, got neither; {hint}built-in:"
+            f" {', '.join(study_names())}"
+        ) from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise StudyError(f"study {name!r}: must be a readable text file, got: {error}; check path and rights") from None
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise StudyError(f"study {name!r}: must be valid TOML, got: {error}; is the file truncated?") from None

@@ -1,0 +1,192 @@
+"""Running the cases of a study: in this process, on a local cluster, or on a scheduler that is there already."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from coupling.studies.case import CASE_FILE, run_case
+from coupling.studies.design import Case, Study, StudyError, cases, load_study
+
+#: Times that a case may lose its worker, the last ones with nothing beside it.
+LOSSES = 3
+CASES, STATUS_FILE, DATA_FILE, STUDY_FILE = "cases", "status.json", "study.nc", "study.json"
+
+
+def study(
+    what: str | Path | dict | Study,
+    out: str | Path | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Callable[[str], None] | None = None,
+):
+    """Run a study and return its dataset.
+
+    Cases that are in `out` already are not run again: each has a folder named after everything that decides its
+    result. A case that fails, or whose worker is lost three times, costs only itself.
+
+    Parameters
+    ----------
+    what : str, path, dict or Study
+        Built-in study, TOML file, or the same as a dictionary.
+    out : str or path, optional
+        Folder; studies/NAME when left out. Studies may share one: equal cases are then shared.
+    workers : int, optional
+        Processes of the local cluster, one thread each; number of cores when left out; 0 runs in this process.
+    scheduler : str, optional
+        Address of a dask scheduler to use instead; its workers must see `out` under the same path.
+    progress : callable, optional
+        Called with one line of text whenever a case ends.
+
+    Returns
+    -------
+    xarray.Dataset
+        See :func:`coupling.studies.collect.collect`; loaded lazily.
+
+    Raises
+    ------
+    StudyError
+        Before anything runs: an invalid study or scene, or a folder that cannot be used.
+    """
+    from coupling.studies.collect import collect
+
+    plan = load_study(what)
+    todo = cases(plan)
+    folder = Path(out) if out is not None else Path("studies") / plan.name
+    tell = progress if progress is not None else lambda line: None
+    try:
+        (folder / CASES).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StudyError(f"study folder '{folder}': cannot be used: {error.strerror}; choose another --out") from None
+    _write_json(folder / STUDY_FILE, plan.model_dump(mode="json"))
+    missing = {case.key: case for case in todo if not case_file(folder, case).is_file()}
+    tell(f"{plan.name}: {len(todo)} cases, {len(todo) - sum(c.key in missing for c in todo)} of them are there already")
+    failures: dict[str, str] = {}
+    for count, (case, failure) in enumerate(_run(plan, list(missing.values()), folder, workers, scheduler), start=1):
+        if failure:
+            failures[case.key] = failure
+        outcome = f"failed: {failure}" if failure else "done"
+        tell(f"{count} of {len(missing)}: case {case.index} ({_shown(case)}) {outcome}")
+    status = {
+        case.key: {"parameters": case.parameters, "status": "failed" if case.key in failures else "finished",
+                   "message": failures.get(case.key, "")}
+        for case in todo
+    }  # fmt: skip
+    _write_json(folder / STATUS_FILE, status)
+    return collect(plan, todo, folder, failures)
+
+
+def case_file(folder: Path, case: Case) -> Path:
+    """Where the results of a case are once it is done."""
+    return folder / CASES / case.key / CASE_FILE
+
+
+def _run(plan, missing, folder, workers, scheduler):
+    if not missing:
+        return
+    if scheduler is None and (workers == 0 or len(missing) == 1):
+        yield from _in_this_process(plan, missing, folder)
+        return
+    yield from _on_cluster(plan, missing, folder, workers, scheduler)
+
+
+def _arguments(plan, case, folder):
+    return case.scene.source, str((folder / CASES / case.key).absolute()), plan.backends, plan.records
+
+
+def _in_this_process(plan, missing, folder):
+    for case in missing:
+        try:
+            run_case(*_arguments(plan, case, folder))
+        except Exception as failure:  # whatever goes wrong in a case is reported and costs only that case
+            yield case, f"{type(failure).__name__}: {failure}"
+        else:
+            yield case, ""
+
+
+def _on_cluster(plan, missing, folder, workers, scheduler):
+    import dask
+    from distributed import Client, LocalCluster
+
+    cluster = None
+    # Every loss of a worker comes back here at once: the scheduler would blame all cases that waited on it.
+    with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
+        if scheduler is None:
+            count = min(workers or os.cpu_count() or 1, len(missing))
+            cluster = LocalCluster(
+                n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None, memory_limit=0,
+            )  # fmt: skip
+        try:
+            with Client(cluster if cluster is not None else scheduler) as client:
+                lost = []
+                at_once = sum(worker["nthreads"] for worker in client.scheduler_info(n_workers=-1)["workers"].values())
+                for case, failure in _submitted(client, plan, missing, folder, max(at_once, 1)):
+                    if isinstance(failure, _lost()):
+                        lost.append(case)
+                    else:
+                        yield case, _text(failure)
+                for case in lost:
+                    yield case, _alone(client, plan, case, folder)
+        finally:
+            if cluster is not None:
+                cluster.close()
+
+
+def _submitted(client, plan, todo, folder, at_once):
+    """Cases and their failures (or None) as they end, never more of them in work than there are threads."""
+    from distributed import as_completed
+
+    waiting = list(reversed(todo))
+    running = {}
+    pool = as_completed()
+
+    def submit():
+        case = waiting.pop()
+        future = client.submit(run_case, *_arguments(plan, case, folder), key=f"{case.key}-{os.urandom(4).hex()}")
+        running[future] = case
+        pool.add(future)
+
+    for _ in range(min(at_once, len(waiting))):
+        submit()
+    while running:
+        future = next(pool)
+        case = running.pop(future)
+        failure = future.exception()
+        if waiting:
+            submit()
+        yield case, failure
+
+
+def _alone(client, plan, case, folder):
+    """Run a case whose worker was lost with nothing beside it, so that a further loss is its own doing."""
+    for _ in range(LOSSES - 1):
+        (_, failure) = next(_submitted(client, plan, [case], folder, 1))
+        if not isinstance(failure, _lost()):
+            break
+    return _text(failure)
+
+
+def _lost():
+    from distributed import CancelledError, KilledWorker
+
+    return KilledWorker, CancelledError
+
+
+def _text(failure):
+    return "" if failure is None else f"{type(failure).__name__}: {failure}"
+
+
+def _shown(case: Case) -> str:
+    return ", ".join(
+        f"{name} = {value:g}" if isinstance(value, float) else f"{name} = {value}"
+        for name, value in case.parameters.items()
+    )
+
+
+def _write_json(path: Path, data: Any):
+    waiting = path.with_suffix(f".{os.getpid()}")
+    waiting.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    waiting.replace(path)

@@ -1,0 +1,236 @@
+"""Studies: designs, content addresses, failures that cost one case, a lost worker, one dataset out of it all."""
+
+import json
+import os
+import signal
+
+import numpy as np
+import pytest
+import xarray as xr
+from test_cli import gush
+
+import coupling
+from coupling.studies import case as case_module
+from coupling.studies import execute
+from coupling.studies.case import at_inflow_masses
+from coupling.studies.design import Study, StudyError, cases, load_study, study_names
+from coupling.studies.sensitivity import scatter, sensitivity, tornado
+
+TINY = {
+    "name": "tiny",
+    "scene": "quick",
+    "records": 3,
+    "parameters": {"gate.angle": [60.0, 90.0], "soils.0.k0": [0.5, 0.6]},
+}
+
+
+def made_up(source, folder, backends, records):
+    """What `run_case` writes, from a formula: the moment is K0 times the angle; K0 = 0.6 at 60 degrees fails."""
+    import tomllib
+
+    scene = coupling.make_scene(tomllib.loads(source)).mpm
+    angle, k0 = scene.gate.angle, scene.soils[0].k0
+    if k0 == 0.6 and angle == 60.0:
+        raise RuntimeError("made to fail")
+    mass = np.linspace(0, 100, records)
+    result = xr.Dataset(
+        {
+            "bending_moment": (("progress",), k0 * angle * mass, {"units": "N m m-1", "long_name": "moment"}),
+            "time": (("progress",), mass / 100, {"units": "s"}),
+            "cpu_seconds": ((), 1.0),
+        },
+        coords={"progress": mass / 100, "inflow_mass": ("progress", mass)},
+    )
+    os.makedirs(folder, exist_ok=True)
+    result.to_netcdf(os.path.join(folder, case_module.CASE_FILE), engine="h5netcdf")
+    return folder
+
+
+def suicidal(source, folder, backends, records):
+    """Kills its worker the first time, and always at 60 degrees with K0 = 0.6."""
+    import tomllib
+
+    scene = coupling.make_scene(tomllib.loads(source)).mpm
+    mark = folder + ".seen"
+    doomed = scene.soils[0].k0 == 0.6 and scene.gate.angle == 60.0
+    if doomed or not os.path.exists(mark):
+        with open(mark, "w"):
+            pass
+        os.kill(os.getpid(), signal.SIGKILL)
+    return made_up(source, folder, backends, records)
+
+
+@pytest.fixture
+def fast(monkeypatch):
+    monkeypatch.setattr(execute, "run_case", made_up)
+
+
+def test_designs_give_their_combinations():
+    factorial = load_study(TINY).combinations()
+    assert [tuple(c.values()) for c in factorial] == [(60.0, 0.5), (60.0, 0.6), (90.0, 0.5), (90.0, 0.6)]
+    assert [tuple(c.values()) for c in load_study(TINY | {"design": "list"}).combinations()] == [
+        (60.0, 0.5),
+        (90.0, 0.6),
+    ]
+    ranges = {
+        "gate.angle": {"low": 0, "high": 180},
+        "soils.0.hydraulic_conductivity": {"low": 1e-5, "high": 1e-3, "scale": "log"},
+    }
+    for design in ("latin-hypercube", "sobol"):
+        plan = load_study({"name": "s", "design": design, "samples": 16, "seed": 3, "parameters": ranges})
+        values = np.array([list(c.values()) for c in plan.combinations()])
+        assert values[:, 0].min() >= 0 and values[:, 0].max() <= 180
+        # one sample in each of sixteen strips, also of the logarithm
+        for shares in (values[:, 0] / 180, np.log(values[:, 1] / 1e-5) / np.log(100)):
+            assert sorted(np.floor(16 * shares).astype(int)) == list(range(16))
+        assert plan.combinations() == plan.combinations()  # equal seeds, equal cases
+
+
+def test_parameters_reach_the_scene_and_what_follows_from_it():
+    stiff = cases(load_study({"name": "s", "parameters": {"soils.0.youngs_modulus": [4e7, 8e7], "scene": ["case-1"]}}))
+    assert [c.scene.mpm.soils[0].youngs_modulus for c in stiff] == [4e7, 8e7]
+    assert [c.scene.ring.ground.youngs_modulus for c in stiff] == [4e7, 8e7]  # derived from the soil
+    assert stiff[0].scene.name == "case-1" and stiff[0].key != stiff[1].key
+    again = cases(load_study({"name": "other", "parameters": {"soils.0.youngs_modulus": [4e7], "scene": ["case-1"]}}))
+    assert again[0].key == stiff[0].key  # the study's name does not decide a result
+    both = cases(
+        load_study(
+            {
+                "name": "s",
+                "backends": ["continuum"],
+                "parameters": {"soils.0.youngs_modulus": [4e7], "scene": ["case-1"]},
+            }
+        )
+    )
+    assert both[0].key != stiff[0].key
+
+
+@pytest.mark.parametrize("name", ["backend", "mesh", "permeability", "table-2"])
+def test_ready_studies_are_valid(name):
+    assert name in study_names() and len(cases(load_study(name))) >= 5
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"parameters": {"gate.angle": {"low": 0, "high": 1}}}, "must be a list of values"),
+        ({"design": "sobol", "samples": 12, "parameters": {"gate.angle": {"low": 0, "high": 1}}}, "use 16"),
+        ({"design": "sobol", "parameters": {"gate.angle": {"low": 0, "high": 1}}}, "samples: must be given"),
+        ({"design": "list", "parameters": {"gate.angle": [1.0], "soils.0.k0": [0.5, 0.6]}}, "equally long"),
+        ({"parameters": {"gate.angel": [1.0]}}, "did you mean 'angle'"),
+        ({"parameters": {"soils.3.k0": [0.5]}}, "below 1, the length"),
+        ({"parameters": {"soils.0.porosity": [0.4, 45.0]}}, "case 1 (soils.0.porosity = 45.0)"),
+        ({"scene": "quik"}, "did you mean 'quick'"),
+        ({"samples": 4}, "leave samples out"),
+        ({"desing": "list"}, "desing"),
+    ],
+)
+def test_impossible_study_is_refused_before_it_runs(change, message):
+    with pytest.raises(StudyError) as refusal:
+        cases(load_study(TINY | change))
+    assert message in str(refusal.value)
+
+
+def test_failed_case_costs_only_itself_and_the_rest_is_not_run_again(fast, tmp_path, monkeypatch):
+    lines = []
+    data = coupling.study(TINY, tmp_path, workers=0, progress=lines.append)
+    assert data["status"].values.tolist() == ["finished", "failed", "finished", "finished"]
+    assert "made to fail" in str(data["message"].values[1])
+    assert np.isnan(data["bending_moment"].values[1]).all()
+    np.testing.assert_allclose(data["bending_moment"].isel(progress=-1).values[[0, 2, 3]], [3000, 4500, 5400])
+    assert data["gate_angle"].values.tolist() == [60, 60, 90, 90] and data.attrs["failed"] == 1
+    calls = []
+    monkeypatch.setattr(execute, "run_case", lambda *a: calls.append(a) or made_up(*a))
+    wider = TINY | {"parameters": TINY["parameters"] | {"soils.0.k0": [0.5, 0.6, 0.7]}}
+    coupling.study(wider, tmp_path, workers=0)
+    assert len(calls) == 3  # what failed, and the two new ones
+    read = coupling.read_study(tmp_path)
+    assert read.sizes["case"] == 6 and read.attrs["failed"] == 1
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of the cluster's own event loop
+def test_lost_workers_cost_only_their_case(tmp_path, monkeypatch):
+    monkeypatch.setattr(execute, "run_case", suicidal)
+    data = coupling.study(TINY, tmp_path / "parallel", workers=2)
+    assert data["status"].values.tolist() == ["finished", "failed", "finished", "finished"]
+    assert "KilledWorker" in str(data["message"].values[1])
+    monkeypatch.setattr(execute, "run_case", made_up)
+    serial = coupling.study(TINY, tmp_path / "serial", workers=0)
+    xr.testing.assert_identical(data["bending_moment"].load(), serial["bending_moment"].load())
+
+
+def test_command_runs_a_study_file(fast, tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text('name = "mine"\nrecords = 3\n[parameters]\n"gate.angle" = [90.0, 120.0, 150.0]\n')
+    result = gush("study", file, "--out", tmp_path / "out", "--workers", "0", "--json", tmp_path / "data.json")
+    assert result.exit_code == 0, result.output
+    data = json.loads((tmp_path / "data.json").read_text())
+    assert [case["status"] for case in data["cases"]] == ["finished"] * 3
+    with xr.open_dataset(data["data"], engine="h5netcdf") as stored:
+        assert stored.sizes["case"] == 3
+    result = gush("study", "permeabilty")
+    assert result.exit_code == 2 and "did you mean 'permeability'" in result.output
+    file.write_text("name = ")
+    assert "must be valid TOML" in gush("study", file).output
+
+
+def test_case_is_taken_at_inflow_masses_and_unknown_beyond_them():
+    time = np.array([0.0, 1.0, 2.0, 3.0])
+    theta = np.arange(0.0, 360.0, 45.0)
+    history = xr.Dataset(
+        {
+            "inflow_mass": ("time", [0.0, 0.0, 40.0, 60.0]),
+            "flow_zone_area": ("time", 10 * time),
+            "cpu_seconds": ("time", time),
+        },
+        coords={"time": time},
+    )
+    pressures = xr.Dataset(
+        {
+            name: (("time", "theta"), time[:, None] + 0 * theta, {"units": "Pa"})
+            for name in ("soil_pressure", "water_pressure", "soil_shear")
+        },
+        coords={"time": time, "theta": theta},
+    )
+    found = at_inflow_masses(pressures, history, {}, np.array([0.0, 20.0, 50.0, 100.0]))
+    np.testing.assert_allclose(found["time"], [0.0, 1.5, 2.5, np.nan])
+    np.testing.assert_allclose(found["flow_zone_area"], [0.0, 15.0, 25.0, np.nan])
+    np.testing.assert_allclose(found["soil_pressure"].isel(theta=3), [0.0, 1.5, 2.5, np.nan])
+    assert found["soil_pressure"].attrs["units"] == "Pa"
+
+
+def test_one_real_case_with_both_models(tmp_path):
+    plan = {
+        "name": "real",
+        "records": 2,
+        "backends": ["beam-spring", "continuum"],
+        "parameters": {"stop.time": [0.004], "stop.inflow_mass": [1.0], "output.interval": [0.002]},
+    }
+    data = coupling.study(plan, tmp_path, workers=0)
+    assert data["status"].values.tolist() == ["finished"]
+    moment = data["bending_moment"].isel(case=0, progress=0)
+    assert moment.dims == ("model", "theta_ring") and moment.sizes == {"model": 2, "theta_ring": 360}
+    beam, continuum = moment.sel(model="beam-spring"), moment.sel(model="continuum")
+    assert float(abs(beam - continuum).max()) < 0.05 * float(abs(beam).max())
+    assert np.isnan(data["soil_pressure"].isel(case=0, progress=1)).all()  # 1 kg/m is not reached in 4 ms
+    assert float(data["quality_grain_mass_error"][0]) == 0.0
+
+
+def test_sensitivity_ranks_parameters_by_their_effect():
+    generator = np.random.default_rng(0)
+    one, two = generator.random(64), generator.random(64)
+    data = xr.Dataset(coords={"case": np.arange(64), "strong": ("case", one), "weak": ("case", two)})
+    quantity = xr.DataArray(10 * one - two, dims="case", attrs={"units": "N", "long_name": "made up"})
+    result = sensitivity(data, quantity)
+    assert result["parameter"].values.tolist() == ["strong", "weak"]
+    # means of the halves of a uniform parameter differ by half its range, up to the sampling of the other
+    assert float(result["effect"][0]) == pytest.approx(5, abs=0.6)
+    assert float(result["rank_correlation"][0]) > 0.95 and result["effect"].attrs["units"] == "N"
+    assert len(tornado(result).axes[0].patches) == 2 and len(scatter(data, quantity).axes) == 2
+    with pytest.raises(ValueError, match="at least 3 cases"):
+        sensitivity(data, quantity.where(quantity.case < 2))
+
+
+def test_definition_travels_with_the_data(fast, tmp_path):
+    data = coupling.study(TINY, tmp_path, workers=0)
+    assert Study.model_validate(json.loads(data.attrs["study"])) == load_study(TINY)
