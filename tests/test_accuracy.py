@@ -125,7 +125,7 @@ def test_page_of_a_mesh_ladder_says_value_and_error_bar(tmp_path):
             "unit": ("quantity", ["kN m/m", "kN/m"]),
         },
     )
-    runs = [{"factor": f, "points": 1, "steps": 1, "cpu_seconds": 1.0, "time": 1.0} for f in factor]
+    runs = [{"factor": f, "points": 1, "steps": 1, "cpu_seconds": 1.0, "time": 1.0, "revision": "abc"} for f in factor]
     written = write_ladder(ladder, "case-3", runs, tmp_path)
     assert "| M max [kN m/m] | 110 | 100 | ±5 | 0 | +10 |" in (tmp_path / "case-3-ladder.md").read_text()
     assert (tmp_path / "images" / "case-3-ladder-500.png").stat().st_size > 5000

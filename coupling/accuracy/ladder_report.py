@@ -27,7 +27,8 @@ def write_ladder(ladder, name: str, runs: list[dict], folder: Path) -> dict:
         "compared at equal inflow mass. Meshes of nearly one size show what the arrangement of elements alone does.",
         "Value at size zero: straight line in mesh size, least squares (stresses of linear triangles: first order).",
         "Error bar: the larger of its distance from the finest mesh and twice the standard error of the fit. Pressures",
-        "are means over ten degrees to either side.",
+        "are means over ten degrees to either side. The runs were computed with revision "
+        f"{', '.join(sorted({r['revision'] for r in runs}))}.",
         "",
         "| mesh over the scene's | points | steps | CPU s | time of the last record [s] |",
         "|---|---|---|---|---|",

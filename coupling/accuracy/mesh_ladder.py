@@ -56,7 +56,7 @@ def quantities(pressures, response, inflow_mass):
 
     state, forces = now(pressures), now(response)
     theta = state["theta"].values
-    values = {}
+    values = {"time since the gate opened": (float(state["time"]), "s")}
     for where, angle in (("crown", 0), ("invert", 180), ("waist across", 270)):
         near = np.abs((theta - angle + 180) % 360 - 180) <= HALF_ARC
         for name in ("soil", "water"):
@@ -93,7 +93,7 @@ def run_ladder(name, folder, inflow_mass, levels=LEVELS, progress=None):
     Returns
     -------
     list of dict
-        factor [-], folder, points, steps, cpu_seconds, time [s] (to the last record).
+        factor [-], folder, points, steps, cpu_seconds, time [s] (to the last record), revision.
     """
     import coupling
     from coupling.datasets import read_attributes, read_history, write_response
@@ -122,6 +122,7 @@ def run_ladder(name, folder, inflow_mass, levels=LEVELS, progress=None):
                     "steps": int(history["steps"][-1]),
                     "cpu_seconds": float(attributes["cpu_seconds"]),
                     "time": float(history["time"][-1]),
+                    "revision": str(attributes["revision"]),
                 }
             )
             if progress is not None:
