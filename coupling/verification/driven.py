@@ -1,4 +1,4 @@
-"""A solver whose nodes may be moved, pushed or damped from outside: walls, footings, tractions, quasi-static loading."""
+"""A solver whose nodes may be moved, pushed or damped from outside: walls, footings, tractions, slow loading."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ class DrivenSolver(Solver):
     scene, mesh : as for :class:`mpm.Solver`
     damping : float
         Share of the change of each nodal velocity component that is taken off where it speeds the node up, and added
-        where it slows it down [-]; 0 is none. Local non-viscous damping, Cundall (1987): steady states keep their loads.
+        where it slows it down [-]; 0 is none. Cundall (1987): a steady state keeps its loads. Not at driven nodes.
 
     Attributes
     ----------
