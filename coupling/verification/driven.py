@@ -5,11 +5,11 @@ import numpy as np
 from mpm.contact import FIXED_X, FIXED_Y
 from mpm.scene import Scene
 from mpm.solver import Solver
-from mpm.variables import V_DSX, V_DSY, V_MS, V_SX, V_SY
+from mpm.variables import V_DLX, V_DLY, V_DSX, V_DSY, V_LX, V_LY, V_MS, V_SX, V_SY
 
 
 class DrivenSolver(Solver):
-    """`mpm.Solver` for dry soil with velocities or forces given at nodes, and local damping.
+    """`mpm.Solver` with velocities or forces given at nodes, and local damping of the grains.
 
     Parameters
     ----------
@@ -22,6 +22,7 @@ class DrivenSolver(Solver):
     ----------
     driven : (n_nodes, 2) bool
         Components whose velocity is given;  velocity : (n_nodes, 2) that velocity [m/s].
+    driven_liquid, velocity_liquid : the same of the pore water.
     force : (n_nodes, 2) float64
         Forces on the nodes from outside [N/m].
     reaction : (n_nodes, 2) float64
@@ -33,6 +34,7 @@ class DrivenSolver(Solver):
         shape = (len(mesh.nodes), 2)
         self.damping = damping
         self.driven, self.velocity = np.zeros(shape, bool), np.zeros(shape)
+        self.driven_liquid, self.velocity_liquid = np.zeros(shape, bool), np.zeros(shape)
         self.force, self.reaction = np.zeros(shape), np.zeros(shape)
         solve, remap = self._solve_nodes, self._remap_nodes
 
@@ -46,6 +48,8 @@ class DrivenSolver(Solver):
             row = self.nodes[part]
             moved = self.driven[part] & (row[:, V_MS] > 0)[:, None]
             row[:, V_SX : V_SY + 1][moved] = self.velocity[part][moved]
+            moved = self.driven_liquid[part]
+            row[:, V_LX : V_LY + 1][moved] = self.velocity_liquid[part][moved]
 
         self._solve_nodes, self._remap_nodes = driven_solve, driven_remap
 
@@ -67,6 +71,10 @@ class DrivenSolver(Solver):
         self.reaction[part] = mass * jump / dt
         velocity += jump
         change += jump
+        moved = self.driven_liquid[part] & full
+        jump = np.where(moved, self.velocity_liquid[part] - row[:, V_LX : V_LY + 1], 0.0)
+        row[:, V_LX : V_LY + 1] += jump
+        row[:, V_DLX : V_DLY + 1] += jump
 
 
 def dry_scene(name, size, width, depth, soil, gravity=9.81, points=3, **numerics):

@@ -73,7 +73,8 @@ def column_collapse(
     return Result(
         error=float(max(abs(run_out / lube_run_out(aspect) - 1), abs(height / lube_height(aspect) - 1))),
         values={
-            "run_out": run_out, "run_out_lube": lube_run_out(aspect),             "height": height, "height_lube": lube_height(aspect),
+            "run_out": run_out, "run_out_lube": lube_run_out(aspect), "height": height,
+            "height_lube": lube_height(aspect),
             "late_speed": float(speed / np.sqrt(gravity * aspect)),
         },
         steps=solver.step_count, points=solver.n_points, cpu_seconds=watch.seconds,
