@@ -28,6 +28,13 @@ def test_footing_comes_down_to_prandtl_with_the_mesh():
     assert errors[0] > errors[1] > errors[2]
 
 
+@pytest.mark.parametrize("dilatancy", [5.0, 30.0])
+def test_dilatant_sand_reaches_rankine_with_smoothing(dilatancy):
+    # with smoothed rates of the skeleton its plastic volume drove motions without resistance: 0.6 instead of 1 / 3
+    result = problems()["active-wall"].solve(cells=5, dilatancy_angle=dilatancy)
+    assert result.error < 0.02  # as without dilatancy
+
+
 def test_exact_stress_path_reaches_the_strength_of_triaxial_compression():
     # strain axial, lateral free to keep the volume: non-dilatant flow at constant mean stress, s3 = Kp s1
     elastic, planes = stiffness(2e7, 0.3), yield_planes(0.0, 30.0, 0.0, 0.0)

@@ -267,6 +267,6 @@ register(Problem(
         "height": (2.0, 3.0, 4.0),
     },
     limit=0.25,
-    why="an empirical law: its width is less by some grain diameters, here by some elements (0.60, 0.91, 1.15 with 4, 8, "
-    "16 across); and the rate grows by 8 % within the run",
+    why="an empirical law: its width is less by some grain diameters, here by some elements (coefficient 0.60, 0.91, "
+    "1.15 with 4, 8, 16 across); and the rate grows by 8 % within the run",
 ))  # fmt: skip
