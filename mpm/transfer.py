@@ -229,7 +229,7 @@ def rates_kernel(wet):
 
 @cache
 def update_kernel(wet, plastic, smoothing, dilatant=False):
-    """Kernel `update_points` for what the scene has: pore water, plastic soils, smoothed volume changes, dilatant soils.
+    """Kernel `update_points` for what the scene has: pore water, plastic or dilatant soils, smoothed volume changes.
 
     A dilatant soil's skeleton takes the rates of its own element. Plastic volume from shear differs between elements,
     and so does the stress that follows; smoothed rates give no resistance to the motions that this drives, which grow.
