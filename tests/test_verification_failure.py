@@ -1,5 +1,7 @@
 """Verification problems of soil that fails, flows and seeps: each fast setting is within its limit."""
 
+import inspect
+
 import pytest
 
 from coupling.verification import earth_pressure, flows, openings, plasticity, problems
@@ -13,6 +15,13 @@ MINE = [p for p in problems().values() if p.solve.__module__ in {m.__name__ for 
 def test_fast_setting_is_within_its_limit(problem):
     result = problem.solve(**problem.fast)
     assert result.error < problem.limit, result.values
+
+
+@pytest.mark.parametrize("problem", MINE, ids=[p.name for p in MINE])
+def test_settings_of_the_ladder_exist(problem):
+    known = inspect.signature(problem.solve).parameters
+    assert set(problem.fast) | set(problem.ladder) <= set(known)
+    assert all(len(values) > 1 for values in problem.ladder.values())
 
 
 def test_error_of_stress_paths_shrinks_with_the_increment():

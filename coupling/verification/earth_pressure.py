@@ -143,13 +143,15 @@ WALL_NORM = "thrust over Rankine's less 1, mean over the last fifth of the path"
 register(Problem(
     name="active-wall", title="active thrust on a smooth wall that gives way", source="Rankine (1857), active state",
     norm=WALL_NORM, solve=active_wall, fast={"cells": 10}, ladder=WALL_LADDER, limit=0.02,
-    why="the state is uniform in x and linear in y, which linear triangles hold exactly; left are waves of the loading",
+    why="uniform in x and linear in y, which linear triangles hold: 0.1 % with associated flow; without dilatancy "
+    "strain localises, the more the finer the mesh (1.5 % with 20 cells)",
 ))  # fmt: skip
 
 register(Problem(
     name="passive-wall", title="passive resistance of soil to a smooth wall", source="Rankine (1857), passive state",
     norm=WALL_NORM, solve=passive_wall, fast={"cells": 10}, ladder=WALL_LADDER, limit=0.02,
-    why="the state is uniform in x and linear in y, which linear triangles hold exactly; left are waves of the loading",
+    why="uniform in x and linear in y, which linear triangles hold: 0.1 % with associated flow; without dilatancy "
+    "strain localises, the more the finer the mesh (1.5 % with 20 cells)",
 ))  # fmt: skip
 
 register(Problem(
