@@ -8,7 +8,7 @@ from coupling.verification.problem import Problem, Result, Stopwatch, register
 from mpm.contact import FIXED_Y
 from mpm.scene import Scene
 from mpm.solver import Solver
-from mpm.variables import MASS, SXX, SXY, SYY, SZZ, VSX, VSY, N, X
+from mpm.variables import MASS, SXX, SXY, SYY, SZZ, VSX, VSY, N, X, Y
 
 
 def front(x, gap):
@@ -18,11 +18,27 @@ def front(x, gap):
     return float(x[wide[0]] if len(wide) else x[-1])
 
 
-def heap_height(solver, x, width):
-    """Material volume over x .. x + width per width [m]."""
-    position = solver.points[:, X]
-    inside = (position >= x) & (position < x + width) & (solver.element_of_point >= 0)
-    return float(solver.points_by_name()["volume"][inside].sum() / width)
+def depth_profile(solver, x):
+    """Depth of the material at the grid lines `x` [m], and the share of it that overlaps.
+
+    The patch of a node cannot hold more than a third of its elements' area: what the points' volumes, shared among
+    the corners of their elements, add up to beyond it has run into itself. Patches, since three points an element
+    differ in number from element to element.
+    """
+    mesh, geometry = solver.mesh, solver.geometry
+    inside = solver.element_of_point >= 0
+    element = solver.element_of_point[inside]
+    g, point = geometry[element], solver.points[inside]
+    dx, dy = point[:, X] - g[:, 4], point[:, Y] - g[:, 5]
+    n1, n2 = g[:, 0] * dx + g[:, 1] * dy, g[:, 2] * dx + g[:, 3] * dy
+    share = np.column_stack([1 - n1 - n2, n1, n2]) * solver.points_by_name()["volume"][inside, None]
+    count = len(mesh.nodes)
+    volume = np.bincount(mesh.elements[element].ravel(), share.ravel(), count)
+    area = np.bincount(mesh.elements.ravel(), np.repeat(geometry[:, 6] / 3, 3), count)
+    held = np.minimum(volume, area)
+    line = np.searchsorted(x, mesh.nodes[:, 0] - 1e-9)
+    width = np.bincount(line, area, len(x)) / np.ptp(mesh.nodes[:, 1])
+    return np.bincount(line, held, len(x)) / width, float(1 - held.sum() / volume.sum())
 
 
 def lube_run_out(aspect):
@@ -41,7 +57,7 @@ def lube_height(aspect):
 
 
 def column_collapse(
-    aspect=2.0, cells=10, friction_angle=31.0, stiffness=300.0, points=3, courant=0.5, pic_rate=10.0, smoothing=True,
+    aspect=2.0, cells=10, friction_angle=31.0, stiffness=300.0, points=12, courant=0.5, pic_rate=10.0, smoothing=True,
     times=6.0,
 ):  # fmt: skip
     """Let a column of dry sand, 1 m long, `cells` elements, and `aspect` m high, fall aside on a rough floor.
@@ -68,14 +84,15 @@ def column_collapse(
         while solver.time < end:
             solver.step(end - solver.time)
     run_out = front(solver.points[:, X], size) - 1
-    height = heap_height(solver, 0.0, size)
+    depth, overlap = depth_profile(solver, x)
+    height = float(depth[0])
     speed = np.sqrt(np.average(np.sum(solver.points[:, VSX : VSY + 1] ** 2, axis=1), weights=solver.points[:, MASS]))
     return Result(
         error=float(max(abs(run_out / lube_run_out(aspect) - 1), abs(height / lube_height(aspect) - 1))),
         values={
             "run_out": run_out, "run_out_lube": lube_run_out(aspect), "height": height,
             "height_lube": lube_height(aspect),
-            "late_speed": float(speed / np.sqrt(gravity * aspect)),
+            "late_speed": float(speed / np.sqrt(gravity * aspect)), "overlap": overlap,
         },
         steps=solver.step_count, points=solver.n_points, cpu_seconds=watch.seconds,
     )  # fmt: skip
@@ -123,7 +140,7 @@ def ritter_depth(x, time, depth, gravity):
 
 
 def dam_break(
-    cells=10, times=4.0, points=3, courant=0.5, pic_rate=10.0, smoothing=True, pressure_filter=0.2,
+    cells=10, times=4.0, points=12, courant=0.5, pic_rate=10.0, smoothing=True, pressure_filter=0.2,
 ):  # fmt: skip
     """Water 1 m deep, `cells` elements, behind a dam that vanishes: depth after `times` sqrt(depth / gravity)."""
     size, gravity = 1.0 / cells, 9.81
@@ -138,17 +155,16 @@ def dam_break(
     with Stopwatch() as watch:
         while solver.time < end:
             solver.step(end - solver.time)
-    edges = mesh.nodes[mesh.bottom if len(mesh.bottom) else np.arange(behind + before + 1), 0]
-    volume, _ = np.histogram(solver.points[:, X], edges, weights=solver.points_by_name()["volume"])
-    depth, centre = volume / size, 0.5 * (edges[1:] + edges[:-1])
-    exact = ritter_depth(centre, end, 1.0, gravity)
-    wave = np.abs(centre) < 2 * times
+    edges = np.arange(-behind, before + 1) * size
+    depth, overlap = depth_profile(solver, edges)
+    exact = ritter_depth(edges, end, 1.0, gravity)
+    wave = np.abs(edges) < 2 * times
     tip = front(solver.points[:, X], size)
     return Result(
-        error=float(np.abs(depth - exact)[wave].sum() / exact[wave & (centre > -times)].sum()),
+        error=float(np.abs(depth - exact)[wave].sum() / exact[wave & (edges > -times)].sum()),
         values={
-            "front": tip / (2 * times), "depth_at_dam": float(np.interp(0.0, centre, depth)),
-            "volume": float(volume.sum() / (behind * size)),
+            "front": tip / (2 * times), "depth_at_dam": float(depth[behind]),
+            "volume": float(np.trapezoid(depth, edges) / behind * cells), "overlap": overlap,
         },
         steps=solver.step_count, points=solver.n_points, cpu_seconds=watch.seconds,
     )  # fmt: skip
@@ -162,7 +178,7 @@ MARTIN_MOYCE = np.array([
 
 
 def water_column(
-    cells=10, points=3, courant=0.5, pic_rate=10.0, smoothing=True, pressure_filter=0.2,
+    cells=10, points=12, courant=0.5, pic_rate=10.0, smoothing=True, pressure_filter=0.2,
 ):  # fmt: skip
     """A column of water 1 m wide, `cells` elements, and 2 m high collapses: its front over time."""
     size, gravity = 1.0 / cells, 9.81
@@ -178,9 +194,10 @@ def water_column(
             while solver.time < end:
                 solver.step(end - solver.time)
             fronts.append(front(solver.points[:, X], size))
+    _, overlap = depth_profile(solver, np.arange(7 * cells + 1) * size)
     error = np.abs(np.array(fronts) - MARTIN_MOYCE[:, 1]) / (MARTIN_MOYCE[-1, 1] - 1)
     return Result(
-        error=float(error.mean()), values={f"front_{t}": f for (t, _), f in zip(MARTIN_MOYCE, fronts, strict=True)},
+        error=float(error.mean()), values={"last_front": fronts[-1], "overlap": overlap},
         steps=solver.step_count, points=solver.n_points, cpu_seconds=watch.seconds,
     )  # fmt: skip
 
@@ -189,9 +206,9 @@ register(Problem(
     name="column-collapse", title="collapse of a dry column of sand in a channel",
     source="Lube et al. (2005), Phys. Rev. E 72, as in Lagree, Staron & Popinet (2011), JFM 686, (3.1)-(3.2)",
     norm="larger relative error of run-out and final height", solve=column_collapse,
-    fast={"aspect": 2.0, "cells": 10},
+    fast={"aspect": 2.0, "cells": 10, "points": 12},
     ladder={
-        "aspect": (0.5, 1.0, 2.0, 4.0), "cells": (5, 10, 20), "courant": (0.25, 0.5, 0.9), "points": (1, 3, 12),
+        "aspect": (0.5, 1.0, 2.0, 4.0), "cells": (5, 10, 20), "courant": (0.25, 0.5, 0.9), "points": (3, 12, 27),
         "pic_rate": (0.0, 10.0, 100.0), "smoothing": (False, True), "friction_angle": (25.0, 31.0, 37.0),
         "stiffness": (100.0, 300.0, 1000.0),
     },
@@ -200,23 +217,23 @@ register(Problem(
 
 register(Problem(
     name="dam-break", title="water behind a dam that vanishes, on a dry smooth bed", source="Ritter (1892)",
-    norm="sum of depth errors over the sum of depths within the wave", solve=dam_break, fast={"cells": 10},
+    norm="sum of depth errors over the sum of depths within the wave", solve=dam_break, fast={"cells": 10, "points": 12},
     ladder={
-        "cells": (5, 10, 20), "times": (2.0, 4.0, 8.0), "courant": (0.25, 0.5, 0.9), "points": (3, 12),
+        "cells": (5, 10, 20), "times": (2.0, 4.0, 8.0), "courant": (0.25, 0.5, 0.9), "points": (3, 12, 27),
         "pic_rate": (0.0, 10.0, 100.0), "smoothing": (False, True), "pressure_filter": (0.0, 0.2),
     },
-    limit=0.18,
+    limit=0.14,
     why="the reference is hydrostatic with a front of no thickness: at its tip, below a tenth of the depth, no element "
-    "is full; and suspended material loses some 5 % of its volume",
+    "is full; 4 % of the water overlaps (17 % with 3 points an element: loss of depth all over)",
 ))  # fmt: skip
 
 register(Problem(
     name="water-column", title="collapse of a column of water twice as high as wide",
     source="Martin & Moyce (1952), Phil. Trans. R. Soc. A 244, figure 3",
-    norm="mean error of the front's position over the distance travelled", solve=water_column, fast={"cells": 10},
+    norm="mean error of the front's position over the distance travelled", solve=water_column, fast={"cells": 10, "points": 12},
     ladder={
-        "cells": (5, 10, 20), "courant": (0.25, 0.5, 0.9), "points": (3, 12), "pic_rate": (0.0, 10.0, 100.0),
+        "cells": (5, 10, 20), "courant": (0.25, 0.5, 0.9), "points": (3, 12, 27), "pic_rate": (0.0, 10.0, 100.0),
         "smoothing": (False, True), "pressure_filter": (0.0, 0.2),
     },
-    limit=0.08, why="the gate of the experiment takes time to leave: its front starts 0.1 a behind; digitised points",
+    limit=0.12, why="the gate of the experiment takes time to leave: its front starts 0.1 a behind; no wall friction here",
 ))  # fmt: skip
