@@ -217,7 +217,8 @@ register(Problem(
 
 register(Problem(
     name="dam-break", title="water behind a dam that vanishes, on a dry smooth bed", source="Ritter (1892)",
-    norm="sum of depth errors over the sum of depths within the wave", solve=dam_break, fast={"cells": 10, "points": 12},
+    norm="sum of depth errors over the sum of depths within the wave", solve=dam_break,
+    fast={"cells": 10, "points": 12},
     ladder={
         "cells": (5, 10, 20), "times": (2.0, 4.0, 8.0), "courant": (0.25, 0.5, 0.9), "points": (3, 12, 27),
         "pic_rate": (0.0, 10.0, 100.0), "smoothing": (False, True), "pressure_filter": (0.0, 0.2),
@@ -230,10 +231,12 @@ register(Problem(
 register(Problem(
     name="water-column", title="collapse of a column of water twice as high as wide",
     source="Martin & Moyce (1952), Phil. Trans. R. Soc. A 244, figure 3",
-    norm="mean error of the front's position over the distance travelled", solve=water_column, fast={"cells": 10, "points": 12},
+    norm="mean error of the front's position over the distance travelled", solve=water_column,
+    fast={"cells": 10, "points": 12},
     ladder={
         "cells": (5, 10, 20), "courant": (0.25, 0.5, 0.9), "points": (3, 12, 27), "pic_rate": (0.0, 10.0, 100.0),
         "smoothing": (False, True), "pressure_filter": (0.0, 0.2),
     },
-    limit=0.12, why="the gate of the experiment takes time to leave: its front starts 0.1 a behind; no wall friction here",
+    limit=0.12,
+    why="the gate of the experiment takes time to leave: its front starts 0.1 a behind; no wall friction here",
 ))  # fmt: skip
