@@ -74,7 +74,7 @@ def closed_form(cohesion, friction_angle, dilatancy_angle, direction, plane_stra
     """Axial stress [Pa] and volumetric strain [-] of a test at constant lateral stress, over the axial strain.
 
     direction -1: compression, 1: extension. Elastic up to s_3 = K_p s_1 - 2 c sqrt(K_p) (tension positive), then
-    constant stress with the dilatancy of the flow rule: Vermeer & de Borst (1984), Heron 29(3), eqs. (3.9)-(3.13).
+    constant stress with the dilatancy of the flow rule: Vermeer & de Borst (1984), Heron 29(3), section 3.
     """
     phi, psi = np.radians(friction_angle), np.sin(np.radians(dilatancy_angle))
     kp = (1 + np.sin(phi)) / (1 - np.sin(phi))
@@ -122,7 +122,7 @@ def _register_laboratory(name, title, direction, plane_strain):
     if plane_strain:
         fast["rotation"], ladder["rotation"] = 25.0, (0.0, 25.0, 45.0, 70.0)
     register(Problem(
-        name=name, title=title, source="Vermeer & de Borst (1984), Heron 29(3), eqs. (3.9)-(3.13)",
+        name=name, title=title, source="Vermeer & de Borst (1984), Heron 29(3), section 3",
         norm="largest error of axial stress over its range, of volumetric strain over its largest, of lateral stress",
         solve=solve, fast=fast, ladder=ladder, limit=1e-8,
         why="the answer is piecewise linear and an implicit step has no error on it: round-off of the Newton iteration",
