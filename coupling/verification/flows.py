@@ -213,7 +213,7 @@ register(Problem(
         "stiffness": (100.0, 300.0, 1000.0),
     },
     limit=0.25,
-    why="one fit for sand, rice and sugar alike: no friction angle enters it, and 25 or 37 degrees instead of 31 change "
+    why="one fit for sand, rice and sugar alike: no friction angle enters; 25 or 37 degrees instead of 31 change "
     "the run-out by 20 %",
 ))  # fmt: skip
 
