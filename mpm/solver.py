@@ -120,7 +120,8 @@ class Solver:
         self._advance_points = advance_kernel(wet)
         self._remap_nodes = remap_kernel(wet)
         self._rates = rates_kernel(wet)
-        self._update = update_kernel(wet, plastic, scene.numerics.volumetric_smoothing)
+        dilatant = plastic and any(soil.dilatancy_angle > 0 for soil in scene.soils if soil.model != "elastic")
+        self._update = update_kernel(wet, plastic, scene.numerics.volumetric_smoothing, dilatant)
         self._relocate_points = relocate_kernel(wet)
         self._water_density = scene.water.density if wet else 0.0
         self._water_modulus = scene.water.bulk_modulus if wet else 0.0

@@ -228,8 +228,12 @@ def rates_kernel(wet):
 
 
 @cache
-def update_kernel(wet, plastic, smoothing):
-    """Kernel `update_points` for what the scene has: pore water, plastic soils, smoothed volume changes."""
+def update_kernel(wet, plastic, smoothing, dilatant=False):
+    """Kernel `update_points` for what the scene has: pore water, plastic or dilatant soils, smoothed volume changes.
+
+    A dilatant soil's skeleton takes the rates of its own element. Plastic volume from shear differs between elements,
+    and so does the stress that follows; smoothed rates give no resistance to the motions that this drives, which grow.
+    """
 
     @kernel
     def update_points(
@@ -311,6 +315,9 @@ def update_kernel(wet, plastic, smoothing):
                 i = order[j]
                 row = points[i]
                 s = soils[soil_of_point[i]]
+                dxx, dyy, dvol = exx, eyy, ts
+                if dilatant and s[S_SIN_DIL] > 0.0:
+                    dxx, dyy, dvol = dt * r[R_XX], dt * r[R_YY], own_s
                 if advance:
                     n = row[N]
                     p = row[P]
@@ -334,7 +341,7 @@ def update_kernel(wet, plastic, smoothing):
                             if p < 0.0:
                                 n_cavitated += 1
                         # looser than in the ground, grains close up by what moves them; else with the skeleton's strain
-                        change = es if n > s[S_N0] else ts
+                        change = es if n > s[S_N0] else dvol
                         if not (loose and p <= 0.0 and change > 0.0):
                             n = 1.0 - (1.0 - n) / (1.0 + change)
                             if n < POROSITY_FLOOR:
@@ -351,10 +358,10 @@ def update_kernel(wet, plastic, smoothing):
                             lam, shear = s[S_LAMBDA], s[S_G]
                             sxx, syy, sxy = row[SXX], row[SYY], row[SXY]
                             turn = 2.0 * spin * sxy
-                            txx = sxx - turn + lam * ts + 2.0 * shear * exx
-                            tyy = syy + turn + lam * ts + 2.0 * shear * eyy
+                            txx = sxx - turn + lam * dvol + 2.0 * shear * dxx
+                            tyy = syy + turn + lam * dvol + 2.0 * shear * dyy
                             txy = sxy + spin * (sxx - syy) + 2.0 * shear * exy
-                            tzz = row[SZZ] + lam * ts
+                            tzz = row[SZZ] + lam * dvol
                             if plastic and s[S_MODEL] != MODEL_ELASTIC:
                                 txx, tyy, tzz, txy, cut = mohr_coulomb(
                                     txx, tyy, tzz, txy, shear, s[S_K], s[S_C_COS], s[S_SIN], s[S_SIN_DIL], s[S_APEX],

@@ -45,3 +45,30 @@ def box_mesh(x, y, filled=None, fixed_bottom=True):
         inner_nodes=none, left=number[:, 0].astype(np.int32), right=number[:, -1].astype(np.int32),
         bottom=number[0].astype(np.int32) if fixed_bottom else none, top=number[-1].astype(np.int32),
     )  # fmt: skip
+
+
+def annulus_mesh(radii, sectors):
+    """Crossed triangles on a quarter annulus about the origin, y downward from 0, all filled; smooth on its two axes.
+
+    Parameters
+    ----------
+    radii : (n,) float64
+        Ascending [m];  sectors : elements over the quarter.
+
+    Returns
+    -------
+    types.SimpleNamespace
+        As :func:`box_mesh`, and `inner`, `outer`: nodes on the two arcs. Only x = 0 is in a list that the solver holds;
+        hold `on_axis` (y = 0) vertically.
+    """
+    radii = np.asarray(radii, float)
+    mesh = box_mesh(np.linspace(0, 1, sectors + 1), np.arange(len(radii)) - len(radii) - 1.0, fixed_bottom=False)
+    angle = np.pi / 2 * mesh.nodes[:, 0]
+    ring = np.round(mesh.nodes[:, 1] - mesh.nodes[0, 1]).astype(int)
+    mesh.nodes = np.column_stack([radii[ring] * np.sin(angle), -radii[ring] * np.cos(angle)])
+    mesh.nodes[np.abs(mesh.nodes) < 1e-12 * radii[-1]] = 0.0
+    mesh.elements = np.ascontiguousarray(mesh.elements[:, ::-1])  # the map turns the sense of the corners
+    mesh.inner = np.flatnonzero(ring == 0)
+    mesh.outer = np.flatnonzero(ring == len(radii) - 1)
+    mesh.on_axis, mesh.right, mesh.top = mesh.right, mesh.right[:0], mesh.right[:0]
+    return mesh

@@ -70,12 +70,19 @@ def return_principal(s1, s2, s3, shear, bulk, c_cos, sin_phi, sin_psi, apex, ten
             cut = 1.0
         s1, s2, s3 = r1, r2, r3
     if s1 > tension:
-        # Capping the tensile principal stresses lowers f, since f grows with s1; all three
-        # capped leave f = 2 (tension sin(phi) - c cos(phi)) <= 0.
+        # A crack opens along its normal: associated flow (Rankine), the others follow through Poisson's ratio. Lowering
+        # s1 by more than s3 lowers f; all three at the tension leave f = 2 (tension sin(phi) - c cos(phi)) <= 0.
         cut = 1.0
+        along = bulk + 4.0 * shear / 3.0
+        across = bulk - 2.0 * shear / 3.0
+        r2 = s2 - across / along * (s1 - tension)
+        r3 = s3 - across / along * (s1 - tension)
+        if r2 > tension:
+            r2 = tension
+            r3 = s3 - across / (along + across) * (s1 + s2 - 2.0 * tension)
         s1 = tension
-        s2 = min(s2, tension)
-        s3 = min(s3, tension)
+        s2 = r2
+        s3 = min(r3, tension)
     return s1, s2, s3, cut
 
 

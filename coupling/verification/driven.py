@@ -1,0 +1,96 @@
+"""A solver whose nodes may be moved, pushed or damped from outside: walls, footings, tractions, slow loading."""
+
+import numpy as np
+
+from mpm.contact import FIXED_X, FIXED_Y
+from mpm.scene import Scene
+from mpm.solver import Solver
+from mpm.variables import V_DLX, V_DLY, V_DSX, V_DSY, V_LX, V_LY, V_MS, V_SX, V_SY
+
+
+class DrivenSolver(Solver):
+    """`mpm.Solver` with velocities or forces given at nodes, and local damping of the grains.
+
+    Parameters
+    ----------
+    scene, mesh : as for :class:`mpm.Solver`
+    damping : float
+        Share of the change of each nodal velocity component that is taken off where it speeds the node up, and added
+        where it slows it down [-]; 0 is none. Cundall (1987): a steady state keeps its loads. Not at driven nodes.
+
+    Attributes
+    ----------
+    driven : (n_nodes, 2) bool
+        Components whose velocity is given;  velocity : (n_nodes, 2) that velocity [m/s].
+    driven_liquid, velocity_liquid : the same of the pore water.
+    force : (n_nodes, 2) float64
+        Forces on the nodes from outside [N/m].
+    reaction : (n_nodes, 2) float64
+        Force of the drive on the soil in the last step [N/m], inertia included.
+    """
+
+    def __init__(self, scene, mesh, damping=0.0):
+        super().__init__(scene, mesh, threads=1)
+        shape = (len(mesh.nodes), 2)
+        self.damping = damping
+        self.driven, self.velocity = np.zeros(shape, bool), np.zeros(shape)
+        self.driven_liquid, self.velocity_liquid = np.zeros(shape, bool), np.zeros(shape)
+        self.force, self.reaction = np.zeros(shape), np.zeros(shape)
+        solve, remap = self._solve_nodes, self._remap_nodes
+
+        def driven_solve(first, last, sums, dt, *rest):
+            solve(first, last, sums, dt, *rest)
+            self._drive(slice(first, last), dt)
+
+        def driven_remap(first, last, *rest):
+            remap(first, last, *rest)
+            part = slice(first, last)
+            row = self.nodes[part]
+            moved = self.driven[part] & (row[:, V_MS] > 0)[:, None]
+            row[:, V_SX : V_SY + 1][moved] = self.velocity[part][moved]
+            moved = self.driven_liquid[part]
+            row[:, V_LX : V_LY + 1][moved] = self.velocity_liquid[part][moved]
+
+        self._solve_nodes, self._remap_nodes = driven_solve, driven_remap
+
+    def _drive(self, part, dt):
+        row = self.nodes[part]
+        mass = row[:, V_MS : V_MS + 1]
+        full = mass > 0
+        velocity, change = row[:, V_SX : V_SY + 1], row[:, V_DSX : V_DSY + 1]
+        free = (np.column_stack([self.fixed[part] & FIXED_X, self.fixed[part] & FIXED_Y]) == 0) & full
+        push = np.where(free, dt * self.force[part] / np.where(full, mass, 1.0), 0.0)
+        velocity += push
+        change += push
+        if self.damping > 0:
+            drag = np.where(free & ~self.driven[part], self.damping * np.abs(change) * np.sign(velocity), 0.0)
+            velocity -= drag
+            change -= drag
+        moved = self.driven[part] & full
+        jump = np.where(moved, self.velocity[part] - velocity, 0.0)
+        self.reaction[part] = mass * jump / dt
+        velocity += jump
+        change += jump
+        moved = self.driven_liquid[part] & full
+        jump = np.where(moved, self.velocity_liquid[part] - row[:, V_LX : V_LY + 1], 0.0)
+        row[:, V_LX : V_LY + 1] += jump
+        row[:, V_DLX : V_DLY + 1] += jump
+
+
+def dry_scene(name, size, width, depth, soil, gravity=9.81, points=3, **numerics):
+    """A dry scene of one soil without a tunnel; `soil` overrides the entries of a cohesionless sand."""
+    return Scene.model_validate({
+        "name": name, "gravity": gravity, "box": {"width": width, "depth": depth},
+        "soils": [{
+            "name": name, "top_depth": 0.0, "model": "mohr-coulomb", "youngs_modulus": 2e7, "poissons_ratio": 0.3,
+            "cohesion": 0.0, "friction_angle": 30.0, "dilatancy_angle": 0.0, "porosity": 0.4, "loose_porosity": 0.85,
+            "grain_density": 2650.0, "k0": 0.5, **soil,
+        }],
+        "discretisation": {
+            "element_size": size, "element_size_lining": size, "element_size_interior": size, "gate_radius": size,
+            "points_per_element": points,
+        },
+        "numerics": numerics,
+        "stop": {"time": 1.0},
+        "output": {"interval": 1.0},
+    })  # fmt: skip

@@ -1,0 +1,168 @@
+"""Limit loads of soil: Rankine's active and passive wall, Prandtl's strip footing.
+
+Displacements stay below a sixth of an element, where the first points lie: nodes of the grid are wall and footing.
+"""
+
+import numpy as np
+
+from coupling.verification.boxes import box_mesh
+from coupling.verification.driven import DrivenSolver, dry_scene
+from coupling.verification.problem import Problem, Result, Stopwatch, register
+from mpm.contact import FIXED_X, FIXED_Y
+from mpm.variables import MASS
+
+DAMPING = 0.3  # local damping of the quasi-static loading
+LATE = 0.2  # share of the path at its end over which the load is averaged
+
+
+def load_path(solver, duration, nodes, component, speed):
+    """Move nodes with `speed` [m/s], reached within the first fifth; late load [N/m], its trend, processor time [s]."""
+    solver.driven[nodes, component] = True
+    times, loads = [], []
+    with Stopwatch() as watch:
+        while solver.time < duration:
+            solver.velocity[nodes, component] = speed * min(1.0, 5 * solver.time / duration)
+            solver.step(duration - solver.time)
+            times.append(solver.time)
+            loads.append(solver.reaction[nodes, component].sum())
+    times, loads = np.array(times), np.array(loads)
+    mean = loads[times > (1 - LATE) * duration].mean()
+    trend = 2 * (loads[times > (1 - LATE / 2) * duration].mean() / mean - 1)
+    return mean, trend, watch.seconds
+
+
+def wall(
+    direction, cells, width, strain, friction_angle, dilatancy_angle, cohesion, rough_base, duration, points, courant,
+    pic_rate, smoothing,
+):  # fmt: skip
+    """Move a smooth wall of 1 m height away from (-1) or into (1) the soil.
+
+    Reference: Rankine (1857), P = K gamma H^2 / 2 -+ 2 c sqrt(K) H with K = tan^2(45 -+ phi / 2); tension is not cut.
+    """
+    size = 1.0 / cells
+    columns = round(width * cells)
+    mesh = box_mesh(np.arange(columns + 1) * size, np.arange(-cells, 3) * size, fixed_bottom=False)
+    soil = {
+        "friction_angle": friction_angle, "dilatancy_angle": dilatancy_angle, "cohesion": cohesion,
+        "tensile_strength": 1e8, "youngs_modulus": 1e8,
+    }  # fmt: skip
+    scene = dry_scene(
+        "wall", size, columns * size, 1.0, soil, points=points, courant=courant, pic_rate=pic_rate,
+        volumetric_smoothing=smoothing,
+    )  # fmt: skip
+    solver = DrivenSolver(scene, mesh, damping=DAMPING)
+    bottom = np.abs(mesh.nodes[:, 1] + 1.0) < 1e-9
+    solver.fixed[bottom] |= (FIXED_X | FIXED_Y) if rough_base else FIXED_Y
+    solver.fixed[mesh.left] &= ~FIXED_X
+    load, trend, seconds = load_path(solver, duration, mesh.left, 0, direction * strain * width / duration)
+    coefficient = np.tan(np.pi / 4 + direction * np.radians(friction_angle) / 2) ** 2
+    geostatic = 0.5 * scene.gravity * solver.points[:, MASS].sum() / (columns * size)
+    exact = coefficient * geostatic + direction * 2 * cohesion * np.sqrt(coefficient)
+    return Result(
+        error=float(abs(load / exact - 1)),
+        values={"coefficient": float(load / geostatic), "exact": float(exact / geostatic), "trend": float(trend)},
+        steps=solver.step_count, points=solver.n_points, cpu_seconds=seconds,
+    )  # fmt: skip
+
+
+def active_wall(
+    cells=10, width=2.0, strain=4e-4, friction_angle=30.0, dilatancy_angle=0.0, cohesion=0.0, rough_base=False,
+    duration=0.5, points=3, courant=0.5, pic_rate=10.0, smoothing=True,
+):  # fmt: skip
+    """Active thrust."""
+    return wall(
+        -1, cells, width, strain, friction_angle, dilatancy_angle, cohesion, rough_base, duration, points, courant,
+        pic_rate, smoothing,
+    )  # fmt: skip
+
+
+def passive_wall(
+    cells=10, width=2.0, strain=1.5e-3, friction_angle=30.0, dilatancy_angle=0.0, cohesion=0.0, rough_base=False,
+    duration=0.5, points=3, courant=0.5, pic_rate=10.0, smoothing=True,
+):  # fmt: skip
+    """Passive resistance."""
+    return wall(
+        1, cells, width, strain, friction_angle, dilatancy_angle, cohesion, rough_base, duration, points, courant,
+        pic_rate, smoothing,
+    )  # fmt: skip
+
+
+def bearing_capacity_factor(friction_angle):
+    """N_c of weightless soil with associated flow: Prandtl (1920); 2 + pi without friction."""
+    if friction_angle == 0:
+        return 2 + np.pi
+    phi = np.radians(friction_angle)
+    return (np.exp(np.pi * np.tan(phi)) * np.tan(np.pi / 4 + phi / 2) ** 2 - 1) / np.tan(phi)
+
+
+def footing(
+    cells=8, friction_angle=0.0, rough=True, settlement=0.0025, stiffness=20000.0, duration=0.25, points=3, courant=0.5,
+    pic_rate=10.0, smoothing=True,
+):  # fmt: skip
+    """Press half a strip footing into weightless soil: `cells` elements, 1 m, and half an element.
+
+    The velocity of the outermost node falls to zero over an element; half of it counts as width, as usual. Without
+    friction Prandtl's mechanism is 1.41 m deep and 3 m wide; with it the log spiral makes both larger.
+    stiffness : Young's modulus over cohesion, times N_c over 2 + pi [-];  duration : times the size of the spiral [s].
+    """
+    size, cohesion, exact = 1.0 / cells, 1e4, bearing_capacity_factor(friction_angle)
+    phi = np.radians(friction_angle)
+    spiral = np.exp(0.5 * np.pi * np.tan(phi)) * np.tan(np.pi / 4 + phi / 2)
+    depth, width = 0.6 + 1.4 * spiral, 1.5 + 2 * spiral
+    mesh = box_mesh(np.arange(round(width * cells) + 1) * size, np.arange(-round(depth * cells), 2) * size)
+    soil = {
+        "cohesion": cohesion, "friction_angle": friction_angle, "dilatancy_angle": friction_angle,
+        "tensile_strength": 1e8, "youngs_modulus": stiffness * cohesion * exact / (2 + np.pi), "k0": 1.0,
+    }  # fmt: skip
+    scene = dry_scene(
+        "footing", size, width, depth, soil, gravity=0.0, points=points, courant=courant, pic_rate=pic_rate,
+        volumetric_smoothing=smoothing,
+    )  # fmt: skip
+    solver = DrivenSolver(scene, mesh, damping=DAMPING)
+    under = np.flatnonzero((np.abs(mesh.nodes[:, 1]) < 1e-9) & (mesh.nodes[:, 0] < 1 + 1e-9))
+    solver.driven[under, 0] = rough
+    load, trend, seconds = load_path(solver, duration * spiral, under, 1, -settlement / (duration * spiral))
+    factor = -load / (cohesion * (1 + size / 2))
+    return Result(
+        error=float(abs(factor / exact - 1)),
+        values={
+            "bearing_capacity_factor": float(factor), "exact": float(exact),
+            "over_nodes_only": float(factor * (1 + size / 2)), "trend": float(trend),
+        },
+        steps=solver.step_count, points=solver.n_points, cpu_seconds=seconds,
+    )  # fmt: skip
+
+
+WALL_LADDER = {
+    "cells": (5, 10, 20), "courant": (0.25, 0.5, 0.9), "points": (1, 3, 12), "pic_rate": (0.0, 10.0, 100.0),
+    "smoothing": (False, True), "friction_angle": (20.0, 30.0, 40.0), "dilatancy_angle": (0.0, 10.0, 30.0),
+    "cohesion": (0.0, 2e3), "rough_base": (False, True),
+}  # fmt: skip
+WALL_NORM = "thrust over Rankine's less 1, mean over the last fifth of the path"
+
+register(Problem(
+    name="active-wall", title="active thrust on a smooth wall that gives way", source="Rankine (1857), active state",
+    norm=WALL_NORM, solve=active_wall, fast={"cells": 10}, ladder=WALL_LADDER, limit=0.02,
+    why="uniform in x and linear in y, which linear triangles hold: 0.1 % with associated flow; without dilatancy "
+    "strain localises, the more the finer the mesh (1.5 % with 20 cells)",
+))  # fmt: skip
+
+register(Problem(
+    name="passive-wall", title="passive resistance of soil to a smooth wall", source="Rankine (1857), passive state",
+    norm=WALL_NORM, solve=passive_wall, fast={"cells": 10}, ladder=WALL_LADDER, limit=0.02,
+    why="uniform in x and linear in y, which linear triangles hold: 0.1 % with associated flow; without dilatancy "
+    "strain localises, the more the finer the mesh (1.5 % with 20 cells)",
+))  # fmt: skip
+
+register(Problem(
+    name="strip-footing", title="bearing capacity of weightless undrained clay under a strip footing",
+    source="Prandtl (1920): N_c = 2 + pi", norm="N_c over 2 + pi less 1, mean over the last fifth of the path",
+    solve=footing, fast={"cells": 8},
+    ladder={
+        "cells": (2, 4, 8, 16), "courant": (0.25, 0.5, 0.9), "points": (1, 3, 12), "pic_rate": (0.0, 10.0, 100.0),
+        "smoothing": (False, True), "rough": (False, True),
+        "friction_angle": (0.0, 10.0, 20.0), "stiffness": (10000.0, 20000.0, 40000.0),
+    },
+    limit=0.05,
+    why="first order, from above as a kinematic field gives it: 7, 3, 2, 1 % with 2, 4, 8, 16 elements",
+))  # fmt: skip
