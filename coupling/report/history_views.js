@@ -1,0 +1,63 @@
+// What is drawn over time, with a cursor at the slider's time; a click moves the slider.
+const COLOURS = ["#0b5394", "#b04a00", "#2f6f1e", "#6a3d9a"], DASHES = ["none", "8 3", "2 3", "8 3 2 3"];
+
+class TimeChart {
+  // lines: [{name, time, values, factor, style}]
+  constructor(key, svg, lines, onPick, { fromZero = true, unit = "" } = {}) {
+    Object.assign(this, { key, svg, lines, unit });
+    const range = roundRange(rangeOf(lines.flatMap((l) => [rangeOf([l.values], l.factor)]), 1), fromZero);
+    this.chart = new LineChart(svg, { x: lines[0].time, xLabel: "time since the gap opened [s]", yRange: range,
+      classes: lines.map(() => "line"), styles: lines.map((l) => l.style), onPick });
+    lines.forEach((line, k) => this.chart.set(k, line.values, line.factor));
+    this.legend = lines.length > 1 ? legend(lines.map((l) => [l.name, "line", l.style])) : [];
+  }
+  draw(frame) {
+    this.chart.cursor(times[frame]);
+    const told = this.lines.map((line) => {
+      const value = line.values[nearest(line.time, times[frame])] * line.factor;
+      return `${this.lines.length > 1 ? `${line.name} ` : ""}${shown(value)}${this.unit ? ` ${this.unit}` : ""}`;
+    }).join(", ");
+    caption(this.key, ...this.legend, sentence(told));
+    this.svg.setAttribute("aria-label", `${this.key.replace(/_/g, " ")} over time, now ${told}`);
+  }
+}
+
+function nearest(ascending, value) {
+  let low = 0, high = ascending.length - 1;
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (ascending[middle] <= value) low = middle; else high = middle;
+  }
+  return Math.abs(ascending[low] - value) <= Math.abs(ascending[high] - value) ? low : high;
+}
+
+function timeCharts(onPick) {
+  const find = (key) => document.getElementById(key), made = [];
+  const line = (name, label, k) => ({ name: label, time: history.time, values: history.series[name].values, factor: 1,
+    style: { stroke: COLOURS[k], strokeDasharray: DASHES[k] } });
+  made.push(new TimeChart("inflow_mass", find("inflow_mass"), [line("inflow_mass", "inflow", 0)], onPick, { unit: "kg/m" }));
+  made.push(new TimeChart("zones", find("zones"), [line("flow_zone_area", "over 50 mm", 0),
+    line("disturbed_area", "10 to 50 mm", 1)], onPick, { unit: "m²" }));
+  const moved = [["convergence_horizontal", "horizontal"], ["convergence_vertical", "vertical"], ["settlement", "settlement"]];
+  const lines = models.flatMap((model, m) => moved.map(([key, label], k) => model.series[key] && {
+    name: models.length > 1 ? `${label}, ${model.name}` : label, time: times, values: model.series[key].values, factor: 1e3,
+    style: { stroke: COLOURS[k], strokeDasharray: DASHES[m] } })).filter(Boolean);
+  if (lines.length) made.push(new TimeChart("convergence", find("convergence"), lines, onPick, { unit: "mm" }));
+  return [...made, ...recordedCharts(onPick)];
+}
+
+function recordedCharts(onPick) {
+  const place = document.getElementById("history"), made = [];
+  for (const [name, series] of Object.entries(history.series)) {
+    const figure = document.createElement("figure"), title = document.createElement("h3"), text = document.createElement("figcaption");
+    const unit = series.units === "1" ? "" : series.units, svg = element("svg", { id: `history-${name}`, role: "img" });
+    figure.dataset.chart = `history-${name}`;
+    title.textContent = `${series.label}${unit ? ` [${unit}]` : ""}`;
+    text.id = `history-${name}-text`;
+    figure.append(title, svg, text);
+    place.append(figure);
+    const drawn = [{ name, time: history.time, values: series.values, factor: 1, style: {} }];
+    made.push(new TimeChart(`history-${name}`, svg, drawn, onPick, { fromZero: false, unit }));
+  }
+  return made;
+}
