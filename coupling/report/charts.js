@@ -1,4 +1,6 @@
 // Charts in SVG: over an axis, and around a ring. Both take rows of values and are redrawn by `set`.
+const WIDTH = 360;  // of every chart, in its own units; the page scales them
+
 function element(name, attributes = {}, parent = null, text = null) {
   const made = document.createElementNS("http://www.w3.org/2000/svg", name);
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
@@ -15,6 +17,7 @@ function ticks(low, high, count) {
 }
 
 function tickText(value) {
+  if (Math.abs(value) >= 1e5) return String(Number(value.toPrecision(4)).toExponential()).replace("e+", "e").replace("-", "−");
   return String(Number(value.toPrecision(6))).replace("-", "−");
 }
 
@@ -36,10 +39,10 @@ function linePath(xs, ys) {
 }
 
 class LineChart {
-  constructor(svg, { x, xLabel, yRange, xTicks = null, classes, styles = [], mark = null, height = 250, onPick = null }) {
+  constructor(svg, { x, xLabel, yRange, xTicks = null, classes, styles = [], mark = null, height = 240, onPick = null }) {
     svg.replaceChildren();
-    svg.setAttribute("viewBox", `0 0 420 ${height}`);
-    Object.assign(this, { svg, x, box: { left: 52, right: 408, top: 16, bottom: height - 38 } });
+    svg.setAttribute("viewBox", `0 0 ${WIDTH} ${height}`);
+    Object.assign(this, { svg, x, box: { left: 50, right: WIDTH - 12, top: 18, bottom: height - 40 } });
     const { left, right, top, bottom } = this.box;
     this.xRange = xTicks ? [xTicks[0], xTicks[xTicks.length - 1]] : [x[0], x[x.length - 1]];
     if (this.xRange[1] <= this.xRange[0]) this.xRange[1] = this.xRange[0] + 1;
@@ -63,7 +66,7 @@ class LineChart {
     if (mark !== null) {
       const at = this.atX(mark);
       element("path", { d: `M${at - 5} ${top - 10}h10l-5 9z`, class: "gate" }, svg);
-      element("text", { x: at + 8, y: top - 2, class: "tick" }, svg, "gap");
+      element("text", { x: at + 8, y: top - 2, class: "tick gate" }, svg, "gap");
     }
     if (onPick) this.pickWith(onPick);
   }
@@ -81,7 +84,7 @@ class LineChart {
   pickWith(onPick) {
     this.svg.style.cursor = "pointer";
     this.svg.addEventListener("click", (event) => {
-      const frame = this.svg.getBoundingClientRect(), at = (event.clientX - frame.left) / frame.width * 420;
+      const frame = this.svg.getBoundingClientRect(), at = (event.clientX - frame.left) / frame.width * WIDTH;
       onPick(this.xRange[0] + (at - this.box.left) / (this.box.right - this.box.left) * (this.xRange[1] - this.xRange[0]));
     });
   }
@@ -90,13 +93,14 @@ class LineChart {
 class PolarChart {
   constructor(svg, { x, yRange, classes, mark = null }) {
     svg.replaceChildren();
-    svg.setAttribute("viewBox", "0 0 420 350");
-    const [low, high] = yRange, outer = 140;
-    Object.assign(this, { x, low, high, outer, inner: low < 0 ? outer / 3 : 0, cx: 210, cy: 176 });
+    svg.setAttribute("viewBox", `0 0 ${WIDTH} 330`);
+    const [low, high] = yRange, outer = 132;
+    Object.assign(this, { x, low, high, outer, inner: low < 0 ? outer / 3 : 0, cx: WIDTH / 2, cy: 165 });
     for (let degree = 0; degree < 360; degree += 45) {
-      const [a, b] = [this.place(degree, low), this.place(degree, high)], label = this.turn(degree, outer + 16);
+      const [a, b] = [this.place(degree, low), this.place(degree, high)], label = this.turn(degree, outer + 18);
       element("line", { x1: a[0], y1: a[1], x2: b[0], y2: b[1], class: "rule" }, svg);
-      element("text", { x: label[0], y: label[1] + 4, "text-anchor": "middle", class: "tick" }, svg, `${degree}°`);
+      const apart = mark === null ? 180 : Math.abs((degree - mark + 540) % 360 - 180);
+      if (apart > 15) element("text", { x: label[0], y: label[1] + 4, "text-anchor": "middle", class: "tick" }, svg, `${degree}°`);
     }
     const labelled = (mark === null ? 172 : mark + 202.5) % 360, rings = ticks(low, high, 4);
     for (const value of rings) {
@@ -109,8 +113,9 @@ class PolarChart {
       element("text", { x: a, y: b + 4, "text-anchor": "middle", class: "tick halo y-tick" }, svg, tickText(value));
     }
     if (mark !== null) {
-      const [a, b] = this.turn(mark, outer + 5);
-      element("path", { d: "M-5 -9h10l-5 9z", class: "gate", transform: `translate(${a.toFixed(1)} ${b.toFixed(1)}) rotate(${mark})` }, svg);
+      const [a, b] = this.turn(mark, outer + 3), text = this.turn(mark, outer + 27);
+      element("path", { d: "M-6 -11h12l-6 11z", class: "gate", transform: `translate(${a.toFixed(1)} ${b.toFixed(1)}) rotate(${mark})` }, svg);
+      element("text", { x: text[0], y: text[1] + 4, "text-anchor": "middle", class: "tick gate" }, svg, "gap");
     }
   }
   radius(value) { return this.inner + (value - this.low) / (this.high - this.low) * (this.outer - this.inner); }

@@ -116,7 +116,7 @@ class FieldView extends CanvasView {
     this.frame(view);
     const left = whole.x - whole.half, bottom = whole.y - whole.half, width = 2 * whole.half;
     const x = snap.x, y = snap.y, side = snap.side, values = snap[name];
-    const grow = 1.45 * snap.spread * this.source.largest_side / 255 * this.pixels;
+    const grow = 1.7 * snap.spread * this.source.largest_side / 255 * this.pixels;
     for (let j = 0; j < snap.count; j++) {
       const [px, py] = this.at(left + x[j] / 65535 * width, bottom + y[j] / 65535 * width);
       if (px < 0 || py < 0 || px > 900 || py > 900) continue;
@@ -150,8 +150,6 @@ class MeshView extends CanvasView {
     const { x, y, corners, region } = this.mesh, view = this.viewOf(this.choice.value), pen = this.pen;
     const colours = ["#efe6d2", "#f2b8a8", "#d6e6f2", "#ffffff"];
     this.frame(view);
-    pen.strokeStyle = "#59636f";
-    pen.lineWidth = this.choice.value === "box" ? 0.4 : 1;
     liningPath(pen, this.at, 2);
     pen.strokeStyle = "#59636f";
     pen.lineWidth = this.choice.value === "box" ? 0.5 : 1;

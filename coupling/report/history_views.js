@@ -2,21 +2,26 @@
 const COLOURS = ["#0b5394", "#b04a00", "#2f6f1e", "#6a3d9a"], DASHES = ["none", "8 3", "2 3", "8 3 2 3"];
 
 class TimeChart {
-  // lines: [{name, time, values, factor, style}]
+  // lines: [{name, model, time, values, factor, style}]; lines of one name differ by their model only
   constructor(key, svg, lines, onPick, { fromZero = true, unit = "" } = {}) {
-    Object.assign(this, { key, svg, lines, unit });
-    const range = roundRange(rangeOf(lines.flatMap((l) => [rangeOf([l.values], l.factor)]), 1), fromZero);
+    Object.assign(this, { key, svg, lines, unit, names: [...new Set(lines.map((l) => l.name))] });
+    const range = roundRange(rangeOf(lines.map((l) => rangeOf([l.values], l.factor)), 1), fromZero);
     this.chart = new LineChart(svg, { x: lines[0].time, xLabel: "time since the gap opened [s]", yRange: range,
       classes: lines.map(() => "line"), styles: lines.map((l) => l.style), onPick });
     lines.forEach((line, k) => this.chart.set(k, line.values, line.factor));
-    this.legend = lines.length > 1 ? legend(lines.map((l) => [l.name, "line", l.style])) : [];
+    const of = (name) => lines.filter((l) => l.name === name);
+    this.models = of(this.names[0]).map((l) => l.model).filter(Boolean);
+    this.legend = this.names.length > 1 ? legend(this.names.map((name) => [name, "line", of(name)[0].style])) : [];
+    if (this.models.length > 1) {
+      this.legend.push(...legend(this.models.map((m, k) => [m, "line", { stroke: "#55606e", strokeDasharray: DASHES[k] }])));
+    }
   }
   draw(frame) {
     this.chart.cursor(times[frame]);
-    const told = this.lines.map((line) => {
-      const value = line.values[nearest(line.time, times[frame])] * line.factor;
-      return `${this.lines.length > 1 ? `${line.name} ` : ""}${shown(value)}${this.unit ? ` ${this.unit}` : ""}`;
-    }).join(", ");
+    const told = this.names.map((name) => {
+      const now = this.lines.filter((l) => l.name === name).map((l) => shown(l.values[nearest(l.time, times[frame])] * l.factor));
+      return `${this.names.length > 1 ? `${name} ` : ""}${now.join(" | ")}${this.unit ? ` ${this.unit}` : ""}`;
+    }).join(", ") + (this.models.length > 1 ? ` (${this.models.join(" | ")})` : "");
     caption(this.key, ...this.legend, sentence(told));
     this.svg.setAttribute("aria-label", `${this.key.replace(/_/g, " ")} over time, now ${told}`);
   }
@@ -40,7 +45,7 @@ function timeCharts(onPick) {
     line("disturbed_area", "10 to 50 mm", 1)], onPick, { unit: "m²" }));
   const moved = [["convergence_horizontal", "horizontal"], ["convergence_vertical", "vertical"], ["settlement", "settlement"]];
   const lines = models.flatMap((model, m) => moved.map(([key, label], k) => model.series[key] && {
-    name: models.length > 1 ? `${label}, ${model.name}` : label, time: times, values: model.series[key].values, factor: 1e3,
+    name: label, model: model.name, time: times, values: model.series[key].values, factor: 1e3,
     style: { stroke: COLOURS[k], strokeDasharray: DASHES[m] } })).filter(Boolean);
   if (lines.length) made.push(new TimeChart("convergence", find("convergence"), lines, onPick, { unit: "mm" }));
   return [...made, ...recordedCharts(onPick)];

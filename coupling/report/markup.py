@@ -3,6 +3,8 @@
 import json
 from html import escape
 
+MINUS = "\N{MINUS SIGN}"
+VERDICTS = {True: "as expected", False: "look at this", None: "–"}
 MODEL_QUESTION = "Lining models side by side"
 RING_CHARTS = (
     ("soil_pressure", "Effective soil pressure", "kPa"),
@@ -69,17 +71,17 @@ script-src 'unsafe-inline'; img-src data:">
 
 
 def shown(value, unit=""):
-    """A number as people read it: four significant digits, a true minus sign."""
+    """A number as people read it: three significant digits, whole from 100 on, a true minus sign (as in unpack.js)."""
     if value is None:
         return "–"
-    if value != 0 and (abs(value) >= 1e6 or abs(value) < 1e-3):
-        text = f"{value:.2e}"
+    if value != 0 and (abs(value) >= 1e6 or abs(value) < 1e-4):
+        mantissa, power = f"{value:.2e}".split("e")
+        text = f"{mantissa}e{int(power)}"
     elif abs(value) >= 100:
         text = f"{value:.0f}"
     else:
-        text = f"{value:.3g}"
-    text = text.replace("-", "\N{MINUS SIGN}") if not text.startswith("-0") or float(text) else "0"
-    return f"{text} {unit}".strip()
+        text = f"{float(f'{value:.3g}')!r}".removesuffix(".0")
+    return f"{text.replace('-', MINUS)} {unit}".strip()
 
 
 def _header(title, data):
@@ -113,34 +115,44 @@ def _duration(seconds):
     )  # fmt: skip
 
 
-def _numbers(numbers, summary):
-    rows = []
-    for n in numbers:
-        error = "no estimate" if n.error is None else f"± {shown(n.error * n.scale)}"
-        basis = f"<small>{escape(n.basis)}</small>" if n.basis else ""
-        rows.append(
-            f'<tr data-key="{n.key}"><th scope="row">{escape(n.label)} <span class="unit">[{escape(n.unit)}]</span></th>'
-            f"<td>{shown(None if n.initial is None else n.initial * n.scale)}</td>"
-            f'<td class="final">{shown(n.final * n.scale)}</td><td class="error">{error}{basis}</td></tr>'
-        )
+def _numbers(groups, summary):
     cost = [("wall time", summary.get("wall_seconds"), "s"), ("processor time", summary.get("cpu_seconds"), "s"),
-            ("time steps", summary["steps"], ""), ("mean time step", 1e6 * summary["mean_dt"], "µs"),
+            ("simulated time", summary["time"], "s"), ("time steps", summary["steps"], ""),
+            ("mean time step", 1e6 * summary["mean_dt"], "µs"),
             ("point updates per processor second", summary["point_steps_per_cpu_second"] / 1e6, "million")]  # fmt: skip
     cards = "".join(
-        f"<div><dt>{name}</dt><dd>{shown(value)}{f' {unit}' if unit else ''}</dd></div>"
-        for name, value, unit in cost
-        if value is not None
+        f"<div><dt>{name}</dt><dd>{shown(value, unit)}</dd></div>" for name, value, unit in cost if value is not None
     )
+    tables = "".join(_number_table(k, title, numbers) for k, (title, numbers) in enumerate(groups.items()))
     return f"""<section aria-labelledby="numbers">
 <h2 id="numbers">Key numbers</h2>
 <dl class="cards">{cards}</dl>
-<div class="scroll" role="region" aria-labelledby="numbers" tabindex="0"><table class="numbers">
-<thead><tr><th scope="col">quantity</th><th scope="col">start</th><th scope="col">end</th>
-<th scope="col">error estimate</th></tr></thead>
-<tbody>{"".join(rows)}</tbody></table></div>
-<p class="fine">The estimates come from this run alone: what it conserves, what fluctuates within an output interval, the
-theory of the start, another lining model. The error of mesh and time step is not among them; a finer run shows it.</p>
+<div class="grid groups">{tables}</div>
+<p class="fine">The estimates come from this run alone: what it conserves, how much neighbouring records scatter, another
+lining model. The error of mesh and time step is not among them; a finer run shows it.</p>
 </section>"""
+
+
+def _number_table(k, title, numbers):
+    shared = {n.basis for n in numbers}
+    caption = f"<caption>Error: {escape(shared.pop())}.</caption>" if len(shared) == 1 else ""
+    rows = []
+    for n in numbers:
+        error = "–" if n.error is None else f"± {shown(float(f'{n.error * n.scale:.2g}'))}"
+        basis = f"<small>{escape(n.basis)}</small>" if n.basis and not caption else ""
+        start = "" if all(other.initial is None for other in numbers) else (
+            f"<td>{shown(None if n.initial is None else n.initial * n.scale)}</td>"
+        )  # fmt: skip
+        rows.append(
+            f'<tr data-key="{n.key}"><th scope="row">{escape(n.label)} <span class="unit">[{escape(n.unit)}]</span>{basis}'
+            f'</th>{start}<td class="final">{shown(None if n.final is None else n.final * n.scale)}</td>'
+            f'<td class="error">{error}</td></tr>'
+        )
+    start = "" if all(n.initial is None for n in numbers) else '<th scope="col">start</th>'
+    return f"""<section><h3 id="numbers-{k}">{escape(title)}</h3>
+<div class="scroll" role="region" aria-labelledby="numbers-{k}" tabindex="0"><table class="numbers">{caption}
+<thead><tr><th scope="col">quantity</th>{start}<th scope="col">end</th><th scope="col">error</th></tr></thead>
+<tbody>{"".join(rows)}</tbody></table></div></section>"""
 
 
 def _figure(key, title, unit, kind, extra=""):
@@ -206,8 +218,8 @@ def _player(player):
 
 def _quality(data):
     rows = "".join(
-        f'<tr class="{"" if good else "bad"}"><th scope="row">{escape(what)}</th><td>{escape(value)}</td>'
-        f"<td>{'as expected' if good else 'look at this'}</td></tr>"
+        f'<tr class="{"bad" if good is False else ""}"><th scope="row">{escape(what)}</th><td>{escape(value)}</td>'
+        f"<td>{VERDICTS[good]}</td></tr>"
         for what, value, good in data["quality"]
     )
     return f"""<section aria-labelledby="quality">

@@ -8,8 +8,7 @@ from coupling.datasets import HISTORY
 from coupling.report.series import match_times, model_names
 from coupling.summary import PLACES
 
-NO_ESTIMATE = "no estimate"
-#: Name: (label, unit shown, factor from SI, largest or smallest value).
+#: Variable and which extreme of it: (label, unit shown, factor from SI).
 RING_EXTREMES = {
     "axial_force_max": ("axial force N, largest", "kN/m", 1e-3),
     "axial_force_min": ("axial force N, smallest", "kN/m", 1e-3),
@@ -24,6 +23,8 @@ RING_EXTREMES = {
 }
 RESIDUAL_LIMIT = 1e-6  # of the loads; the ring's iteration stops well below
 MASS_LIMIT = 1e-9  # relative; grains are only moved, so round-off is all that may show
+SHEAR_LIMIT = 0.05  # of the largest Q; the slope of M is taken over one element
+THEORY_LIMIT = 0.02  # of the mean pressure; an element at the lining sees the depth of its middle
 
 
 class Number(NamedTuple):
@@ -37,44 +38,62 @@ class Number(NamedTuple):
     unit: str
     scale: float
     initial: float | None
-    final: float
+    final: float | None
     error: float | None
     basis: str
 
 
-def key_numbers(run, scene=None):
+def key_numbers(run):
     """What the run came to.
 
     Parameters
     ----------
     run : xarray.DataTree
         From :func:`coupling.read_run`, with at least one record.
-    scene : coupling.Scene or None
-        For the theory of the initial pressures.
 
     Returns
     -------
-    list of Number
+    dict
+        Title of a group to its list of Number; groups without numbers are left out.
     """
-    return [*_inflow_numbers(run["history"].to_dataset()), *_pressure_numbers(run, scene), *_ring_numbers(run)]
+    groups = {
+        "Gushing": _inflow_numbers(run),
+        "Pressures on the lining": _pressure_numbers(run["lining"].to_dataset()),
+        "Forces and deformation of the ring": _ring_numbers(run),
+    }
+    return {title: numbers for title, numbers in groups.items() if numbers}
 
 
-def _inflow_numbers(history):
+def _inflow_numbers(run):
+    history = run["history"].to_dataset()
     last, mass = history.isel(time=-1), history["grain_mass"].values
-    lost = float(np.abs(mass - mass[0]).max())
+    one_point = _mass_of_a_point_inside(run)
     numbers = [
-        Number("time", "simulated time", "s", 1.0, None, float(last["time"]), None, "sum of the time steps"),
-        Number("inflow_mass", "inflow mass", "kg/m", 1.0, None, float(last["inflow_mass"]), lost,
-               "change of the mass of all grains"),
+        Number("inflow_mass", "inflow mass", "kg/m", 1.0, None, float(last["inflow_mass"]),
+               float(np.abs(mass - mass[0]).max()) + one_point, "change of all mass, and one point"),
     ]  # fmt: skip
     rate = inflow_rate(history)
     if rate is not None:
-        numbers.append(Number("inflow_rate", "inflow rate, second half of the run", "kg/m/s", 1.0, None, *rate,
-                              "standard deviation between four parts"))  # fmt: skip
+        numbers.append(Number("inflow_rate", "inflow rate, second half of the time", "kg/m/s", 1.0, None, *rate,
+                              "scatter between four parts"))  # fmt: skip
     for name, label in (("flow_zone_area", "flow zone (moved over 50 mm)"),
                         ("disturbed_area", "disturbed zone (10 to 50 mm)")):  # fmt: skip
         numbers.append(Number(name, label, "m²", 1.0, None, float(last[name]), None, ""))
+    numbers.append(Number("max_velocity", "largest velocity of the grains", "m/s", 1.0, None,
+                          float(last["max_velocity"]), None, ""))  # fmt: skip
     return numbers
+
+
+def _mass_of_a_point_inside(run):
+    """Largest grain mass of a point inside the gate's tunnel at the last snapshot [kg/m]: inflow is counted in them."""
+    points = run["points"].to_dataset() if "points" in run.children else None
+    if points is None or "grain_mass" not in points or not points.sizes["time"] or "tunnel_x" not in points.attrs:
+        return 0.0
+    attrs, k = points.attrs, int(points.attrs.get("gate_tunnel", 0))
+    x, depth, inner = (np.atleast_1d(attrs[f"tunnel_{n}"])[k] for n in ("x", "axis_depth", "inner_radius"))
+    last = points.isel(time=-1)
+    inside = np.hypot(last["x"].values - x, last["y"].values + depth) < inner
+    return float(np.nanmax(last["grain_mass"].values[inside])) if inside.any() else 0.0
 
 
 def inflow_rate(history):
@@ -90,32 +109,55 @@ def inflow_rate(history):
     return float(rates.mean()), float(rates.std(ddof=1))
 
 
-def _pressure_numbers(run, scene):
-    lining = run["lining"].to_dataset()
+def scatter(values, spread):
+    """Standard deviation of one record: of its differences to its neighbours, and within its output interval.
+
+    Parameters
+    ----------
+    values : (n,) float64
+        A quantity over time; the last fifth, at least five records, is used. Differences of neighbours leave its trend
+        out; of independent errors they have twice the variance.
+    spread : float
+        Standard deviation within the last output interval.
+
+    Returns
+    -------
+    float
+        None with fewer than five records.
+    """
+    if len(values) < 5:
+        return None
+    last = values[-max(5, len(values) // 5) :]
+    return float(np.hypot(np.std(np.diff(last)) / np.sqrt(2), spread))
+
+
+def _pressure_numbers(lining):
     if "soil_pressure" not in lining:
         return []
     if "tunnel" in lining.dims:
         lining = lining.isel(tunnel=int(lining.attrs.get("gate_tunnel", 0)))
     numbers = []
-    for name, label in (("soil_pressure", "soil pressure"), ("water_pressure", "water pressure")):
+    for name, label in (("soil_pressure", "soil"), ("water_pressure", "water")):
         for place, theta in PLACES.items():
-            here = lining.sel(theta=theta)
+            series, spread = lining[name].sel(theta=theta).values, lining[f"{name}_std"].sel(theta=theta).values
+            open_here = len(series) > 1 and _in_gap(lining.attrs, theta)
             numbers.append(
                 Number(
-                    f"{name}_{theta}", f"{label}, {place} ({theta}°)", "kPa", 1e-3, float(here[name].isel(time=0)),
-                    float(here[name].isel(time=-1)), float(here[f"{name}_std"].isel(time=-1)),
-                    "standard deviation within the last output interval",
+                    f"{name}_{theta}", f"{label}, {place}{' (the gap)' if open_here else ''}", "kPa", 1e-3,
+                    float(series[0]), None if open_here else float(series[-1]),
+                    None if open_here else scatter(series, spread[-1]), "scatter of the last records",
                 )
             )  # fmt: skip
-    theory = initial_theory(scene, lining["theta"].values)
-    for name, label in (("soil_pressure", "initial soil pressure"), ("water_pressure", "initial water pressure")):
-        if theory is None:
-            break
-        off = lining[name].isel(time=0).values - theory[name].isel(time=0).values
-        mean = float(lining[name].isel(time=0).mean())
-        numbers.append(Number(f"initial_{name}", f"{label}, mean of all angles", "kPa", 1e-3, mean, mean,
-                              float(np.abs(off).max()), "largest difference from K0 and hydrostatic theory"))  # fmt: skip
     return numbers
+
+
+def _in_gap(geometry, theta):
+    """Whether an angle [degree] lies in the gap, where the open lining carries no pressure."""
+    if "gate_angle" not in geometry:
+        return False
+    outer = float(np.atleast_1d(geometry["tunnel_outer_radius"])[int(geometry["gate_tunnel"])])
+    half = np.degrees(np.arcsin(min(1.0, 0.5 * float(geometry["gate_width"]) / outer)))
+    return abs((theta - float(geometry["gate_angle"]) + 180) % 360 - 180) <= half
 
 
 def initial_theory(scene, theta):
@@ -171,7 +213,7 @@ def _ring_numbers(run):
         rows, present = match_times(responses[name]["time"].values, first["time"].values[-1:])
         if present[0]:
             others.append(ring_extremes(responses[name], int(rows[0])))
-    basis = f"{models[0]} against {', '.join(models[1:])}" if others else "one lining model: nothing to compare with"
+    basis = f"difference from {', '.join(models[1:])}" if others else "none: one lining model, nothing to compare with"
     return [
         Number(key, label, unit, scale, start[key], end[key],
                max((abs(other[key] - end[key]) for other in others if key in other), default=None), basis)
@@ -179,7 +221,7 @@ def _ring_numbers(run):
     ]  # fmt: skip
 
 
-def quality(run, summary):
+def quality(run, summary, scene=None):
     """Balances and limits that say how far the numbers can be trusted.
 
     Parameters
@@ -187,33 +229,52 @@ def quality(run, summary):
     run : xarray.DataTree
     summary : dict
         From :func:`coupling.summary.summarise_run`.
+    scene : coupling.Scene or None
+        For the theory of the initial pressures.
 
     Returns
     -------
-    list of (str, str, bool)
-        What, how much, and whether it is within what is expected.
+    list of (str, str, bool or None)
+        What, how much, and whether it is within what is expected; None where nothing is expected of it.
     """
-    history = run["history"].to_dataset()
     rows = [("mass of the grains, largest relative change", f"{summary['grain_mass_error']:.1e}",
              summary["grain_mass_error"] <= MASS_LIMIT)]  # fmt: skip
+    rows += _against_theory(run["lining"].to_dataset(), scene)
     for name in model_names(run):
         response = run[f"structure/{name}"].to_dataset()
-        if "equilibrium_residual" in response and response.sizes["time"]:
+        if not response.sizes["time"]:
+            continue
+        if "equilibrium_residual" in response:
             worst = float(np.abs(response["equilibrium_residual"]).max())
             rows.append((f"equilibrium of the ring, {name}: largest unbalanced share", f"{worst:.1e}",
                          worst <= RESIDUAL_LIMIT))  # fmt: skip
-        if "shear_moment_residual" in response and response.sizes["time"]:
+        if "shear_moment_residual" in response:
             share = float(np.abs(response["shear_moment_residual"]).max() / np.nanmax(np.abs(response["shear_force"])))
-            rows.append((f"Q + dM/ds, {name}: largest departure over the largest Q", f"{share:.1e}", share <= 0.05))
+            rows.append((f"Q = -dM/ds, {name}: largest departure over the largest Q", f"{share:.1e}",
+                         share <= SHEAR_LIMIT))  # fmt: skip
     for name, count in summary["clamps"].items():
         share = count / max(summary["point_steps"], 1)
-        rows.append((f"limit '{name.replace('_', ' ')}' acted", f"{count} times, {share:.1e} of the updates", True))
-    for name, variable in history.data_vars.items():
+        rows.append((f"limit '{name.replace('_', ' ')}' acted", f"{count} times, {100 * share:.2g} % of the updates", None))
+    for name, variable in run["history"].to_dataset().data_vars.items():
         if name not in HISTORY and variable.dims == ("time",):
-            worst = float(np.abs(variable).max())
-            unit = variable.attrs.get("units", "")
+            worst, unit = float(np.abs(variable).max()), variable.attrs.get("units", "")
             rows.append((f"{variable.attrs.get('long_name', name)}: largest size",
-                         f"{worst:.3g} {'' if unit == '1' else unit}".strip(), bool(np.isfinite(worst))))  # fmt: skip
+                         f"{worst:.3g} {'' if unit == '1' else unit}".strip(), None))  # fmt: skip
+    return rows
+
+
+def _against_theory(lining, scene):
+    """Initial pressures of the first record against K0 and hydrostatic theory, the mean of which is the measure."""
+    theory = initial_theory(scene, lining["theta"].values) if "soil_pressure" in lining else None
+    if theory is None:
+        return []
+    rows = []
+    for name, label in (("soil_pressure", "soil"), ("water_pressure", "water")):
+        expected = theory[name].isel(time=0).values
+        worst, mean = float(np.abs(lining[name].isel(time=0).values - expected).max()), float(expected.mean())
+        if mean > 0:
+            rows.append((f"initial {label} pressure against theory, largest difference at any angle",
+                         f"{worst / 1e3:.2g} kPa, {100 * worst / mean:.2g} % of the mean", worst <= THEORY_LIMIT * mean))  # fmt: skip
     return rows
 
 
@@ -223,7 +284,7 @@ def warnings(run, attributes, quality_rows):
     if attributes["status"] != "finished":
         message = attributes.get("status_message") or "the page shows what was computed until then"
         found.append(f"The run is '{attributes['status']}': {message}.")
-    found += [f"Outside what is expected: {what}: {value}." for what, value, good in quality_rows if not good]
+    found += [f"Outside what is expected: {what}: {value}." for what, value, good in quality_rows if good is False]
     lining = run["lining"].to_dataset()
     records = lining.sizes["time"]
     models = model_names(run)

@@ -66,13 +66,13 @@ def collect(run):
     if not min(tree["lining"].sizes["time"], tree["history"].sizes["time"]):
         raise RunFileError(f"run file '{run_file(run)}': has no complete record yet; wait for the first one")
     scene, summary = read_scene(attributes), summarise_run(run)
-    quality_rows = quality(tree, summary)
+    quality_rows = quality(tree, summary, scene)
     frames = choose_frames(tree)
     fields = field_snapshots(tree["points"].to_dataset()) if "points" in tree.children else None
     return {
         "attributes": attributes,
         "summary": summary,
-        "numbers": key_numbers(tree, scene),
+        "numbers": key_numbers(tree),
         "quality": quality_rows,
         "warnings": warnings(tree, attributes, quality_rows),
         "notes": _thinned(tree, frames, fields, scene),

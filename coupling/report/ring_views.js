@@ -14,7 +14,7 @@ class RingChart {
     const options = { x: this.angles, yRange: range, mark: gate ? gate.angle : null,
       classes: ["initial", ...lines.map((_, k) => modelClass(k))] };
     this.chart = shape === "polar" ? new PolarChart(svg, options) : new LineChart(svg, { ...options,
-      xLabel: "angle from the crown, clockwise [°]", xTicks: [0, 60, 120, 180, 240, 300, 360], height: 270 });
+      xLabel: "angle from the crown, clockwise [°]", xTicks: [0, 60, 120, 180, 240, 300, 360], height: 250 });
     this.chart.set(0, lines[0].rows.row(0), this.factor);
     this.lines = lines;
     this.legend = legend([["start", "initial"], ...lines.map((l, k) => [l.name, modelClass(k)])]);
@@ -49,14 +49,14 @@ class DeformedRing {
     this.svg = document.getElementById("deformed");
     const { outer_radius: outer, inner_radius: inner } = models[0];
     this.radius = (outer + inner) / 2;
-    this.svg.setAttribute("viewBox", `${-1.35 * outer} ${-1.3 * outer} ${2.7 * outer} ${2.6 * outer}`);
+    this.svg.setAttribute("viewBox", `${-1.4 * outer} ${-1.3 * outer} ${2.8 * outer} ${2.6 * outer}`);
     this.svg.style.strokeWidth = 0.02;
     const frames = Array.from(times.keys());
     const largest = Math.max(1e-12, ...models.flatMap((m) => frames.map((f) => {
       const size = this.shape(m, f).reduce((most, [r, t]) => Math.max(most, Math.hypot(r, t) || 0), 0);
       return size;
     })));
-    const raw = 0.18 * this.radius / largest, power = 10 ** Math.floor(Math.log10(raw));
+    const raw = 0.3 * this.radius / largest, power = 10 ** Math.floor(Math.log10(raw));
     this.enlarged = Math.max(...[1, 2, 5].filter((s) => s * power <= raw * 1.000001)) * power;
     for (const r of [outer, inner]) element("circle", { r, class: "rule", "vector-effect": "non-scaling-stroke" }, this.svg);
     const line = (name) => element("path", { class: name, "vector-effect": "non-scaling-stroke" }, this.svg);
@@ -65,7 +65,7 @@ class DeformedRing {
     this.joints = models.map((m) => m.joint_angle.map(() =>
       element("circle", { r: 0.022 * this.radius, class: "joint", "vector-effect": "non-scaling-stroke" }, this.svg)));
     this.names = models[0].joint_angle.map((angle, k) => {
-      const a = angle * Math.PI / 180, r = 0.78 * this.radius;
+      const a = angle * Math.PI / 180, r = 0.7 * this.radius;
       return element("text", { x: r * Math.sin(a), y: -r * Math.cos(a) + 0.05 * this.radius, "text-anchor": "middle",
         style: `font-size:${0.11 * this.radius}px` }, this.svg, String(k + 1));
     });
