@@ -1,11 +1,9 @@
-"""The command line `gush`: run, plan, respond, scenes, bench.
+"""The command line `gush`: run, plan, respond, report, export, info, scenes, bench.
 
 Exit codes: 0 done, 2 refused input, 3 run failed, 130 interrupted. Heavy libraries load inside the commands.
 """
 
 import contextlib
-import json
-import sys
 import time as clock
 from pathlib import Path
 from typing import Annotated
@@ -14,7 +12,11 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-REFUSED, FAILED, INTERRUPTED = 2, 3, 130
+from coupling.exit_codes import JsonPath
+from coupling.exit_codes import checked_json as _checked_json
+from coupling.exit_codes import failures as _failures
+from coupling.exit_codes import write_json as _write_json
+from coupling.result_commands import export_command, info_command, report_command
 
 app = typer.Typer(
     add_completion=False,
@@ -26,7 +28,6 @@ app = typer.Typer(
 )
 
 SceneName = Annotated[str, typer.Argument(help="A built-in scene (see `gush scenes`) or a TOML file.")]
-JsonPath = Annotated[Path | None, typer.Option("--json", help="Also write the result as JSON; - prints it.")]
 Threads = Annotated[int | None, typer.Option(min=1, help="Threads; all cores when left out. Does not change results.")]
 
 
@@ -165,6 +166,11 @@ def bench_command(
             Console().print(table)
 
 
+app.command("report")(report_command)
+app.command("export")(export_command)
+app.command("info")(info_command)
+
+
 def main():
     """Entry point of the command `gush`."""
     app()
@@ -226,69 +232,6 @@ class ProgressLine:
         if share < 0.01 or elapsed < 1.0:
             return "?"
         return _duration(elapsed * (1 - min(share, 1.0)) / share)
-
-
-@contextlib.contextmanager
-def _failures():
-    """Turn what a user can cause into one message and an exit code."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        _complain("interrupted; what was computed stays readable", INTERRUPTED)
-    except (ValueError, RuntimeError, MemoryError, OSError) as error:
-        code = _exit_code(error)
-        if code is None:
-            raise
-        _complain("\n".join([str(error) or "not enough memory", *getattr(error, "__notes__", ())]), code)
-
-
-def _exit_code(error):
-    """2 for refused input, 3 for a failed run, None for what is a mistake of the program."""
-    from coupling.datasets import RunFileError
-    from coupling.run_folder import RunRefused
-    from coupling.scene import SceneError
-    from mpm.mesh import MeshError
-    from mpm.solver import RunFailed
-    from structure import LiningFailure
-
-    if isinstance(error, (RunFileError, RunRefused, SceneError, MeshError, MemoryError, JsonRefused)):
-        return REFUSED
-    if isinstance(error, (RunFailed, LiningFailure)):
-        return FAILED
-    # what reaches here as OSError is a full disk or a missing right, found while writing
-    return FAILED if isinstance(error, OSError) else None
-
-
-class JsonRefused(ValueError):
-    """A --json path that cannot be written."""
-
-
-@contextlib.contextmanager
-def _checked_json(path):
-    """Refuse a --json path before the work instead of after it."""
-    if path is not None and str(path) != "-":
-        if path.is_dir() or not path.absolute().parent.is_dir():
-            raise JsonRefused(f"--json '{path}': must be a file in an existing folder; choose another path")
-        if path.exists():
-            with path.open("rb") as file:
-                if file.read(1) not in (b"{", b""):
-                    raise JsonRefused(f"--json '{path}': exists and is not JSON; choose another path")
-    yield
-
-
-def _write_json(path, data):
-    if path is None:
-        return
-    text = json.dumps(data, indent=2) + "\n"
-    if str(path) == "-":
-        sys.stdout.write(text)
-    else:
-        path.write_text(text, encoding="utf-8")
-
-
-def _complain(message, code):
-    Console(stderr=True).print(message, style="red", markup=False, highlight=False, soft_wrap=True)
-    raise typer.Exit(code)
 
 
 def _scene_row(scene):

@@ -59,6 +59,9 @@ def claimed(folder, overwrite=False):
             (folder / name).unlink(missing_ok=True)
         for picture in (folder / FIGURES).glob("*.png"):
             picture.unlink()
+        for fields in (folder / FIELDS).glob("*"):
+            if fields.suffix in (".vtu", ".pvd", ".xdmf", ".h5", ".gif"):
+                fields.unlink()
         yield folder
     finally:
         with contextlib.suppress(OSError):

@@ -51,11 +51,14 @@ function timeCharts(onPick) {
   return [...made, ...recordedCharts(onPick)];
 }
 
+// "kg m-1" as kg/m, "m2" as m²
+const readable = (units) => (units === "1" ? "" : units.replace(/ (\w+)-1/g, "/$1").replace(/m2\b/, "m²"));
+
 function recordedCharts(onPick) {
   const place = document.getElementById("history"), made = [];
   for (const [name, series] of Object.entries(history.series)) {
     const figure = document.createElement("figure"), title = document.createElement("h3"), text = document.createElement("figcaption");
-    const unit = series.units === "1" ? "" : series.units, svg = element("svg", { id: `history-${name}`, role: "img" });
+    const unit = readable(series.units), svg = element("svg", { id: `history-${name}`, role: "img" });
     figure.dataset.chart = `history-${name}`;
     title.textContent = `${series.label}${unit ? ` [${unit}]` : ""}`;
     text.id = `history-${name}-text`;

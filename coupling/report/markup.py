@@ -90,7 +90,8 @@ def _header(title, data):
     messages = "".join(f"<li>{escape(text)}</li>" for text in warned)
     notes = "".join(f"<li>{escape(text)}</li>" for text in data["notes"])
     warned_block = (
-        f'<section class="warnings" aria-labelledby="warnings"><h2 id="warnings">Warnings</h2><ul>{messages}</ul></section>'
+        f'<section class="warnings" aria-labelledby="warnings"><h2 id="warnings">Warnings</h2>'
+        f"<ul>{messages}</ul></section>"
         if warned
         else '<p class="fine">No warnings.</p>'
     )
@@ -144,8 +145,8 @@ def _number_table(k, title, numbers):
             f"<td>{shown(None if n.initial is None else n.initial * n.scale)}</td>"
         )  # fmt: skip
         rows.append(
-            f'<tr data-key="{n.key}"><th scope="row">{escape(n.label)} <span class="unit">[{escape(n.unit)}]</span>{basis}'
-            f'</th>{start}<td class="final">{shown(None if n.final is None else n.final * n.scale)}</td>'
+            f'<tr data-key="{n.key}"><th scope="row">{escape(n.label)} '
+            f'<span class="unit">[{escape(n.unit)}]</span>{basis}</th>{start}<td class="final">{shown(None if n.final is None else n.final * n.scale)}</td>'
             f'<td class="error">{error}</td></tr>'
         )
     start = "" if all(n.initial is None for n in numbers) else '<th scope="col">start</th>'
@@ -171,7 +172,8 @@ def _figure(key, title, unit, kind, extra=""):
 def _player(player):
     parts, lining, models = [], player["lining"], player["models"]
     if player["fields"]:
-        options = "".join(f'<option value="{k}">{escape(f["label"])}</option>' for k, f in player["fields"]["fields"].items())
+        scalars = player["fields"]["fields"].items()
+        options = "".join(f'<option value="{key}">{escape(scalar["label"])}</option>' for key, scalar in scalars)
         tools = (
             f'<div class="tools"><label>Field <select id="field">{options}</select></label>'
             '<label>View <select id="field-view"><option value="tunnel">around the tunnel</option>'
@@ -203,7 +205,8 @@ def _player(player):
     return f"""<section id="player" aria-labelledby="player-title" tabindex="-1">
 <h2 id="player-title">Player over time</h2>
 <noscript><p class="warnings">The player needs JavaScript; numbers, balances and scene do not.</p></noscript>
-<p class="fine">One slider moves every chart. Keys: arrows step, Home and End jump, Page Up and Page Down leap, space plays.</p>
+<p class="fine">One slider moves every chart. Keys: arrows step, Home and End jump, Page Up and Page Down leap,
+space plays.</p>
 <div class="bar">
 <button id="play" type="button" aria-pressed="false">Play</button>
 <label class="slider"><span class="hidden">Time</span><input id="time" type="range" min="0" step="1"></label>
@@ -242,8 +245,8 @@ def _scene(data):
     mesh_text, mesh_figure = "", ""
     if mesh:
         mesh_text = (
-            f"{mesh['elements']} triangles, {mesh['nodes']} nodes; flattest triangle {shown(1e3 * mesh['min_altitude'])} mm, "
-            f"smallest angle {mesh['min_angle']:.0f}°."
+            f"{mesh['elements']} triangles, {mesh['nodes']} nodes; flattest triangle "
+            f"{shown(1e3 * mesh['min_altitude'])} mm, smallest angle {mesh['min_angle']:.0f}°."
         )
         tools = (
             '<div class="tools"><label>View <select id="mesh-view"><option value="tunnel">around the tunnel</option>'
@@ -254,7 +257,8 @@ def _scene(data):
 <h2 id="scene">Scene and mesh</h2>
 <div class="grid wide">{_figure("section", "Section through the ground", "", "svg")}{mesh_figure}</div>
 <p id="mesh-facts">{mesh_text}</p>
-<div class="scroll" role="region" aria-labelledby="scene" tabindex="0"><table class="facts"><tbody>{facts}</tbody></table></div>
+<div class="scroll" role="region" aria-labelledby="scene" tabindex="0">
+<table class="facts"><tbody>{facts}</tbody></table></div>
 <h3 id="parts">What was computed and what was left out</h3>
 <div class="scroll" role="region" aria-labelledby="parts" tabindex="0"><table>
 <thead><tr><th scope="col">part</th><th scope="col"></th><th scope="col">why</th></tr></thead>

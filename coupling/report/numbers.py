@@ -253,8 +253,8 @@ def quality(run, summary, scene=None):
             rows.append((f"Q = -dM/ds, {name}: largest departure over the largest Q", f"{share:.1e}",
                          share <= SHEAR_LIMIT))  # fmt: skip
     for name, count in summary["clamps"].items():
-        share = count / max(summary["point_steps"], 1)
-        rows.append((f"limit '{name.replace('_', ' ')}' acted", f"{count} times, {100 * share:.2g} % of the updates", None))
+        share = 100 * count / max(summary["point_steps"], 1)
+        rows.append((f"limit '{name.replace('_', ' ')}' acted", f"{count} times, {share:.2g} % of the updates", None))
     for name, variable in run["history"].to_dataset().data_vars.items():
         if name not in HISTORY and variable.dims == ("time",):
             worst, unit = float(np.abs(variable).max()), variable.attrs.get("units", "")
@@ -273,8 +273,9 @@ def _against_theory(lining, scene):
         expected = theory[name].isel(time=0).values
         worst, mean = float(np.abs(lining[name].isel(time=0).values - expected).max()), float(expected.mean())
         if mean > 0:
-            rows.append((f"initial {label} pressure against theory, largest difference at any angle",
-                         f"{worst / 1e3:.2g} kPa, {100 * worst / mean:.2g} % of the mean", worst <= THEORY_LIMIT * mean))  # fmt: skip
+            what = f"initial {label} pressure against theory, largest difference at any angle"
+            size = f"{worst / 1e3:.2g} kPa, {100 * worst / mean:.2g} % of the mean"
+            rows.append((what, size, worst <= THEORY_LIMIT * mean))
     return rows
 
 

@@ -39,7 +39,7 @@ function shown(value) {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);
   if (size === 0) return "0";
-  if (size >= 1e6 || size < 1e-4) return value.toExponential(2).replace(/-/g, "−");
+  if (size >= 1e6 || size < 1e-4) return value.toExponential(2).replace("e+", "e").replace(/-/g, "−");
   if (size >= 100) return value.toFixed(0).replace("-", "−");
   return String(Number(value.toPrecision(3))).replace("-", "−");
 }
