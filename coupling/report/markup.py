@@ -129,31 +129,34 @@ def _numbers(groups, summary):
 <h2 id="numbers">Key numbers</h2>
 <dl class="cards">{cards}</dl>
 <div class="grid groups">{tables}</div>
-<p class="fine">The estimates come from this run alone: what it conserves, how much neighbouring records scatter, another
-lining model. The error of mesh and time step is not among them; a finer run shows it.</p>
+<p class="fine">The estimates come from this run alone: what it conserves, how much neighbouring records scatter,
+another lining model. The error of mesh and time step is not among them; a finer run shows it.</p>
 </section>"""
 
 
 def _number_table(k, title, numbers):
-    shared = {n.basis for n in numbers}
+    shared, with_start = {n.basis for n in numbers}, any(n.initial is not None for n in numbers)
     caption = f"<caption>Error: {escape(shared.pop())}.</caption>" if len(shared) == 1 else ""
-    rows = []
-    for n in numbers:
-        error = "–" if n.error is None else f"± {shown(float(f'{n.error * n.scale:.2g}'))}"
-        basis = f"<small>{escape(n.basis)}</small>" if n.basis and not caption else ""
-        start = "" if all(other.initial is None for other in numbers) else (
-            f"<td>{shown(None if n.initial is None else n.initial * n.scale)}</td>"
-        )  # fmt: skip
-        rows.append(
-            f'<tr data-key="{n.key}"><th scope="row">{escape(n.label)} '
-            f'<span class="unit">[{escape(n.unit)}]</span>{basis}</th>{start}<td class="final">{shown(None if n.final is None else n.final * n.scale)}</td>'
-            f'<td class="error">{error}</td></tr>'
-        )
-    start = "" if all(n.initial is None for n in numbers) else '<th scope="col">start</th>'
+    rows = "".join(_number_row(n, with_start, not caption) for n in numbers)
+    start = '<th scope="col">start</th>' if with_start else ""
     return f"""<section><h3 id="numbers-{k}">{escape(title)}</h3>
 <div class="scroll" role="region" aria-labelledby="numbers-{k}" tabindex="0"><table class="numbers">{caption}
 <thead><tr><th scope="col">quantity</th>{start}<th scope="col">end</th><th scope="col">error</th></tr></thead>
-<tbody>{"".join(rows)}</tbody></table></div></section>"""
+<tbody>{rows}</tbody></table></div></section>"""
+
+
+def _number_row(n, with_start, with_basis):
+    def value(number):
+        return shown(None if number is None else number * n.scale)
+
+    basis = f"<small>{escape(n.basis)}</small>" if n.basis and with_basis else ""
+    # an error is known to two digits at best
+    error = "–" if n.error is None else f"± {shown(float(f'{n.error * n.scale:.2g}'))}"
+    return (
+        f'<tr data-key="{n.key}"><th scope="row">{escape(n.label)} <span class="unit">[{escape(n.unit)}]</span>{basis}'
+        f"</th>{f'<td>{value(n.initial)}</td>' if with_start else ''}"
+        f'<td class="final">{value(n.final)}</td><td class="error">{error}</td></tr>'
+    )
 
 
 def _figure(key, title, unit, kind, extra=""):

@@ -28,7 +28,7 @@ function toggle() {
     const next = Number(slider.value) + 1;
     if (next <= last) show(next);
     if (next >= last) stop();
-  }, Math.max(40, 1000 * SECONDS_OF_PLAY / Math.max(last, 1)));
+  }, Math.min(400, Math.max(40, 1000 * SECONDS_OF_PLAY / Math.max(last, 1))));
 }
 
 function pick(time) {

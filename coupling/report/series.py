@@ -34,7 +34,7 @@ def model_names(run):
 
 
 def lining_series(run, frames):
-    """Pressures at the frames: {theta, tunnels: list of name to packed (n_frames, n_theta) [Pa]}; None without lining."""
+    """Pressures at the frames: {theta, tunnels: list of name to packed (n_frames, n_theta) [Pa]}, or None."""
     lining = run["lining"].to_dataset()
     if "soil_pressure" not in lining:
         return None
