@@ -153,11 +153,26 @@ def _animation(points, path):
         pictures.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
     frame = int(1000 * min(LONGEST_FRAME, SECONDS_OF_ANIMATION / len(pictures)))
     lasting = [frame] * (len(pictures) - 1) + [int(1000 * LAST_FRAME)]
-    # one palette for all, from the last picture, which has the most colours
-    palette = pictures[-1].quantize(256)
+    palette = _palette()
     drawn = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     drawn[0].save(path, save_all=True, append_images=drawn[1:], duration=lasting, loop=0)
     return path
+
+
+def _palette():
+    """The 256 colours that a GIF may have, the same for all pictures: even samples of the colour maps, and greys."""
+    import matplotlib
+    from PIL import Image
+
+    from coupling.figures import FIELD_COLOURS
+
+    greys = 24
+    each = (256 - greys) // len(FIELD_COLOURS)
+    maps = [matplotlib.colormaps[name](np.linspace(0, 1, each), bytes=True)[:, :3] for name in FIELD_COLOURS]
+    grey = np.repeat(np.linspace(0, 255, greys).astype("u1")[:, None], 3, axis=1)
+    image = Image.new("P", (1, 1))
+    image.putpalette(np.concatenate([*maps, grey]).tobytes())
+    return image
 
 
 def _vector(x, y):

@@ -33,6 +33,7 @@ STYLE = {
 RESOLUTION = 200  # dots per inch of saved pictures
 INITIAL, NOW, GATE, SECOND = "0.45", "#0b5394", "#c1272d", "#d98200"
 CONCRETE = "0.82"
+FIELD_COLOURS = ("viridis", "magma_r", "YlGnBu", "cividis")  # of displacement, strain, pore pressure, stress
 
 
 def fields_around_tunnel(points, half_width=None, tops=None):
@@ -92,11 +93,11 @@ def _fields(points, x0, y0, half):
     data = {name: points[name].values[near] for name in points.data_vars if points[name].dims == ("point",)}
     displacement = 1e3 * np.hypot(data["displacement_x"], data["displacement_y"])
     return data, (
-        ("displacement [mm]", displacement, "viridis", LogNorm(1.0, 1000.0), "both"),
-        ("deviatoric strain [-]", data["deviatoric_strain"], "magma_r", LogNorm(1e-3, 1.0), "both"),
+        ("displacement [mm]", displacement, FIELD_COLOURS[0], LogNorm(1.0, 1000.0), "both"),
+        ("deviatoric strain [-]", data["deviatoric_strain"], FIELD_COLOURS[1], LogNorm(1e-3, 1.0), "both"),
         # a negative value stands for water that is missing: it carries nothing
-        ("pore pressure [kPa]", np.maximum(data["pore_pressure"], 0.0) / 1e3, "YlGnBu", None, "neither"),
-        ("vertical effective stress [kPa]", -data["stress_yy"] / 1e3, "cividis", None, "max"),
+        ("pore pressure [kPa]", np.maximum(data["pore_pressure"], 0.0) / 1e3, FIELD_COLOURS[2], None, "neither"),
+        ("vertical effective stress [kPa]", -data["stress_yy"] / 1e3, FIELD_COLOURS[3], None, "max"),
     )
 
 

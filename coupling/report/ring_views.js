@@ -3,14 +3,15 @@ const modelClass = (k) => `line model-${k % 4}`;
 let shape = "polar", tunnel = gate ? gate.tunnel : 0;
 
 class RingChart {
-  constructor(key, angles, sources) {
-    Object.assign(this, { key, angles, sources });  // sources: () => [{name, rows}], one for each line "now"
+  // sources: () => [{name, rows}], one for each line "now"; compared: () => arrays that share the range of values
+  constructor(key, angles, sources, compared = () => sources().map((l) => l.rows.values)) {
+    Object.assign(this, { key, angles, sources, compared });
     [this.unit, this.factor] = QUANTITIES[key];
     this.build();
   }
   build() {
     const lines = this.sources(), svg = document.getElementById(this.key);
-    const range = roundRange(rangeOf(lines.map((l) => l.rows.values), this.factor), true);
+    const range = roundRange(rangeOf(this.compared(), this.factor), true);
     const options = { x: this.angles, yRange: range, mark: gate ? gate.angle : null,
       classes: ["initial", ...lines.map((_, k) => modelClass(k))] };
     this.chart = shape === "polar" ? new PolarChart(svg, options) : new LineChart(svg, { ...options,
@@ -36,7 +37,8 @@ class RingChart {
 function ringCharts() {
   const made = [];
   for (const key of tunnels.length ? ["soil_pressure", "water_pressure", "soil_shear"] : []) {
-    made.push(new RingChart(key, data.lining.theta, () => [{ name: "now", rows: tunnels[tunnel][key] }]));
+    made.push(new RingChart(key, data.lining.theta, () => [{ name: "now", rows: tunnels[tunnel][key] }],
+      () => tunnels.map((t) => t[key].values)));
   }
   for (const key of models.length ? ["axial_force", "shear_force", "bending_moment"] : []) {
     made.push(new RingChart(key, models[0].theta, () => models.map((m) => ({ name: m.name, rows: m.fields[key] }))));
