@@ -20,11 +20,10 @@ def moving_record(time):
     return made
 
 
-def write_run(path, scene=None, times=TIMES, models=("beam-spring", "continuum"), status="finished", name=None):
+def write_run(path, scene=None, times=TIMES, models=("beam-spring", "continuum"), status="finished"):
     """File of a synthetic run; the second model is a ring of another theory of bending."""
     scene = make_quick_scene() if scene is None else scene
-    attributes = root_attributes(scene) | ({} if name is None else {"scene_name": name})
-    writer = datasets.RunWriter(path, attributes, scene.mpm, TwoTriangles())
+    writer = datasets.RunWriter(path, root_attributes(scene), scene.mpm, TwoTriangles())
     for time in times:
         writer.append(moving_record(time))
     writer.close(status, wall_seconds=12.0, cpu_seconds=11.0)
