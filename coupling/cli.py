@@ -1,11 +1,9 @@
-"""The command line `gush`: run, plan, respond, compare, scenes, bench.
+"""The command line `gush`. Commands that show results or measure the program stand in modules of their own.
 
 Exit codes: 0 done, 2 refused input, 3 run failed, 130 interrupted. Heavy libraries load inside the commands.
 """
 
 import contextlib
-import json
-import sys
 import time as clock
 from pathlib import Path
 from typing import Annotated
@@ -14,7 +12,9 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-REFUSED, FAILED, INTERRUPTED = 2, 3, 130
+from coupling.exit_codes import JsonPath, checked_json, failures, write_json
+from coupling.measure_commands import accuracy_command, study_command
+from coupling.result_commands import export_command, info_command, report_command
 
 app = typer.Typer(
     add_completion=False,
@@ -26,7 +26,6 @@ app = typer.Typer(
 )
 
 SceneName = Annotated[str, typer.Argument(help="A built-in scene (see `gush scenes`) or a TOML file.")]
-JsonPath = Annotated[Path | None, typer.Option("--json", help="Also write the result as JSON; - prints it.")]
 SOURCE = "Folder or run.nc of a run, or a netCDF-4 file with pressures that follow the schema."
 RingScene = Annotated[
     str | None, typer.Option("--scene", help="Scene whose ring is taken; that of the run when left out.")
@@ -49,7 +48,7 @@ def run_command(
     JSON: keys of `coupling.summary.summarise_run`, and `run` (folder), `figures` (paths), `response` (keys of
     `coupling.summary.summarise_response`, or null).
     """
-    with _failures(), _checked_json(json_path):
+    with failures(), checked_json(json_path):
         from coupling.datasets import RunFileError, read_response
         from coupling.quality import quality_line
         from coupling.run import run
@@ -65,7 +64,7 @@ def run_command(
             data["response"] = summarise_response(read_response(folder))
             data["quality"]["lining_equilibrium"] = data["response"]["equilibrium_residual"]
         data["figures"] = sorted(str(path) for path in (folder / FIGURES).glob("*.png"))
-        _write_json(json_path, data)
+        write_json(json_path, data)
         if not quiet and str(json_path) != "-":
             console = Console()
             console.print(_run_table(data))
@@ -81,12 +80,12 @@ def plan_command(scene: SceneName, threads: Threads = None, json_path: JsonPath 
 
     JSON: keys of `coupling.plan.plan`.
     """
-    with _failures(), _checked_json(json_path):
+    with failures(), checked_json(json_path):
         from coupling.plan import plan
         from coupling.scene import load_scene
 
         data = plan(load_scene(scene), threads)
-        _write_json(json_path, data)
+        write_json(json_path, data)
         if str(json_path) != "-":
             console = Console()
             console.print(_feature_table(data))
@@ -106,7 +105,7 @@ def respond_command(
 
     JSON: keys of `coupling.summary.summarise_response`, and `run`, `backend`.
     """
-    with _failures(), _checked_json(json_path):
+    with failures(), checked_json(json_path):
         from coupling.datasets import write_response
         from coupling.pressure_source import read_source
         from coupling.run import respond_by_name
@@ -116,7 +115,7 @@ def respond_command(
         response = respond_by_name(source.ring, source.pressures, backend)
         write_response(source.file, response, backend)
         data = {"run": str(run), "backend": backend, **summarise_response(response)}
-        _write_json(json_path, data)
+        write_json(json_path, data)
         if str(json_path) != "-":
             Console().print(_response_table(data))
 
@@ -140,14 +139,14 @@ def compare_command(
 
     JSON: `run`, `models`, `cpu_seconds`, `rows` (see `coupling.compare.compare`), `differences`, `figures` (paths).
     """
-    with _failures(), _checked_json(json_path):
+    with failures(), checked_json(json_path):
         from coupling.compare import compare, store
         from coupling.pressure_source import read_source
 
         source = read_source(run, scene)
         comparison = compare(source, first, second, open_gate)
         data = {"run": str(run), **store(comparison, source, out)}
-        _write_json(json_path, data)
+        write_json(json_path, data)
         if str(json_path) != "-":
             console = Console()
             console.print(_comparison_table(data))
@@ -163,11 +162,11 @@ def scenes_command(json_path: JsonPath = None):
     JSON: `scenes`, a list of {name, soil, cover [m], gate_angle [degree], gate_width [m], tunnels, stop_time [s],
     stop_inflow_mass [kg/m]}.
     """
-    with _failures(), _checked_json(json_path):
+    with failures(), checked_json(json_path):
         from coupling.scene import load_scene, scene_names
 
         data = {"scenes": [_scene_row(load_scene(name).mpm) for name in scene_names()]}
-        _write_json(json_path, data)
+        write_json(json_path, data)
         if str(json_path) != "-":
             table = Table("scene", "soil", "cover", "gate", "tunnels", "until")
             for row in data["scenes"]:
@@ -194,12 +193,12 @@ def bench_command(
     JSON: step_points_per_second, reference_points_per_second, step_to_reference_ratio and the keys of
     `coupling.bench.bench`.
     """
-    with _failures(), _checked_json(json_path):
+    with failures(), checked_json(json_path):
         from coupling.bench import bench
         from coupling.scene import load_scene
 
         data = bench(load_scene(scene))
-        _write_json(json_path, data)
+        write_json(json_path, data)
         if str(json_path) != "-":
             table = Table("point-steps per CPU second", "million", title=f"{data['scene']}, {data['points']} points")
             table.add_row("two-phase step of this program", f"{data['step_points_per_second'] / 1e6:.2f}")
@@ -208,65 +207,11 @@ def bench_command(
             Console().print(table)
 
 
-@app.command("accuracy")
-def accuracy_command(
-    problems: Annotated[list[str] | None, typer.Argument(help="Verification problems; all when left out.")] = None,
-    scene: Annotated[
-        str | None, typer.Option(help="Instead: a mesh ladder of this scene, at equal inflow mass.")
-    ] = None,
-    inflow_mass: Annotated[float, typer.Option(help="Last inflow mass of the mesh ladder [kg/m].")] = 1000.0,
-    fast: Annotated[bool, typer.Option("--fast", help="Default settings only, no ladders.")] = False,
-    out: Annotated[Path, typer.Option(help="Folder for the page, its data and pictures.")] = Path("accuracy"),
-    json_path: JsonPath = None,
-):
-    """Error against processor time over mesh size, time step and numerical options; a page, data and pictures.
-
-    JSON: see `coupling.accuracy.report.write`; with --scene `coupling.accuracy.ladder_report.write_ladder`.
-    """
-    with _failures(), _checked_json(json_path):
-        from coupling.accuracy.command import problem_ladders, scene_ladder
-
-        tell = Console(stderr=True).print
-        if scene is not None:
-            data = scene_ladder(scene, inflow_mass, out, tell)
-        else:
-            data = problem_ladders(problems or [], fast, out, tell)
-        _write_json(json_path, data)
-        if str(json_path) != "-":
-            console = Console()
-            if scene is None:
-                console.print(_accuracy_table(data))
-            console.print(f"page: {data['page']}", highlight=False, soft_wrap=True)
-
-
-@app.command("study")
-def study_command(
-    study: Annotated[
-        str, typer.Argument(help="A built-in study (table-2, permeability, mesh, backend) or a TOML file.")
-    ],
-    out: Annotated[
-        Path | None, typer.Option(help="Folder; studies/NAME when left out. What is there is not rerun.")
-    ] = None,
-    workers: Annotated[int | None, typer.Option(min=0, help="Processes; all cores when left out, 0: this one.")] = None,
-    scheduler: Annotated[str | None, typer.Option(help="Address of a running dask scheduler to use instead.")] = None,
-    json_path: JsonPath = None,
-):
-    """Run many scenes that differ in some parameters, in parallel; one dataset of them all. Rerun to resume.
-
-    JSON: `study`, `folder`, `data` (netCDF file), `cases`: list of {case, parameters, status, message, cpu_seconds [s],
-    time [s]: of the last inflow mass reached}.
-    """
-    with _failures(), _checked_json(json_path):
-        from coupling.studies.command import run_study
-
-        data = run_study(study, out, workers, scheduler, Console(stderr=True).print)
-        _write_json(json_path, data)
-        if str(json_path) != "-":
-            console = Console()
-            console.print(_study_table(data))
-            console.print(f"data: {data['data']}", highlight=False, soft_wrap=True)
-        if any(case["status"] == "failed" for case in data["cases"]):
-            raise typer.Exit(3)
+app.command("report")(report_command)
+app.command("export")(export_command)
+app.command("info")(info_command)
+app.command("accuracy")(accuracy_command)
+app.command("study")(study_command)
 
 
 def main():
@@ -330,69 +275,6 @@ class ProgressLine:
         if share < 0.01 or elapsed < 1.0:
             return "?"
         return _duration(elapsed * (1 - min(share, 1.0)) / share)
-
-
-@contextlib.contextmanager
-def _failures():
-    """Turn what a user can cause into one message and an exit code."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        _complain("interrupted; what was computed stays readable", INTERRUPTED)
-    except (ValueError, RuntimeError, MemoryError, OSError) as error:
-        code = _exit_code(error)
-        if code is None:
-            raise
-        _complain("\n".join([str(error) or "not enough memory", *getattr(error, "__notes__", ())]), code)
-
-
-def _exit_code(error):
-    """2 for refused input, 3 for a failed run, None for what is a mistake of the program."""
-    from coupling.datasets import RunFileError
-    from coupling.run_folder import RunRefused
-    from coupling.scene import SceneError
-    from mpm.mesh import MeshError
-    from mpm.solver import RunFailed
-    from structure import LiningFailure
-
-    if isinstance(error, (RunFileError, RunRefused, SceneError, MeshError, MemoryError, JsonRefused)):
-        return REFUSED
-    if isinstance(error, (RunFailed, LiningFailure)):
-        return FAILED
-    # what reaches here as OSError is a full disk or a missing right, found while writing
-    return FAILED if isinstance(error, OSError) else None
-
-
-class JsonRefused(ValueError):
-    """A --json path that cannot be written."""
-
-
-@contextlib.contextmanager
-def _checked_json(path):
-    """Refuse a --json path before the work instead of after it."""
-    if path is not None and str(path) != "-":
-        if path.is_dir() or not path.absolute().parent.is_dir():
-            raise JsonRefused(f"--json '{path}': must be a file in an existing folder; choose another path")
-        if path.exists():
-            with path.open("rb") as file:
-                if file.read(1) not in (b"{", b""):
-                    raise JsonRefused(f"--json '{path}': exists and is not JSON; choose another path")
-    yield
-
-
-def _write_json(path, data):
-    if path is None:
-        return
-    text = json.dumps(data, indent=2) + "\n"
-    if str(path) == "-":
-        sys.stdout.write(text)
-    else:
-        path.write_text(text, encoding="utf-8")
-
-
-def _complain(message, code):
-    Console(stderr=True).print(message, style="red", markup=False, highlight=False, soft_wrap=True)
-    raise typer.Exit(code)
 
 
 def _scene_row(scene):
@@ -465,24 +347,6 @@ def _comparison_table(data):
             f"{row['time']:.3g} s",
             row["cause"] or "-",
         )
-    return table
-
-
-def _accuracy_table(data):
-    table = Table("problem", "error", "limit", "CPU s", "default over the best of what costs no more")
-    for name, row in data["problems"].items():
-        limit = f"{row['limit']:.2g}" if row["within"] else f"[red]{row['limit']:.2g} exceeded[/red]"
-        table.add_row(name, f"{row['error']:.2e}", limit, f"{row['cpu_seconds']:.2f}", f"{row['excess']:.2f}")
-    return table
-
-
-def _study_table(data):
-    names = list(data["cases"][0]["parameters"])
-    table = Table("case", *names, "status", "CPU s", "time [s]".replace("[", "\\["), title=data["study"])
-    for case in data["cases"]:
-        values = [f"{v:.4g}" if isinstance(v, float) else str(v) for v in case["parameters"].values()]
-        numbers = [f"{case['cpu_seconds']:.0f}", f"{case['time']:.3g}"] if case["status"] == "finished" else ["", ""]
-        table.add_row(str(case["case"]), *values, case["message"] or case["status"], *numbers)
     return table
 
 

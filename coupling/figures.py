@@ -33,9 +33,10 @@ STYLE = {
 RESOLUTION = 200  # dots per inch of saved pictures
 INITIAL, NOW, GATE, SECOND = "0.45", "#0b5394", "#c1272d", "#d98200"
 CONCRETE = "0.82"
+FIELD_COLOURS = ("viridis", "magma_r", "YlGnBu", "cividis")  # of displacement, strain, pore pressure, stress
 
 
-def fields_around_tunnel(points, half_width=None):
+def fields_around_tunnel(points, half_width=None, tops=None):
     """Displacement, deviatoric strain, pore pressure, vertical effective stress (compression positive) on the points.
 
     Parameters
@@ -44,27 +45,19 @@ def fields_around_tunnel(points, half_width=None):
         One time of `/points` (see :func:`coupling.datasets.read_points`).
     half_width : float, optional
         Half the width of the view [m]; three outer radii when left out.
+    tops : dict, optional
+        Title of a panel to the top of its colours, from :func:`common_tops`; that of this time when left out.
     """
     geometry = _Geometry(points)
     x0, y0, radius = geometry.centre
     half = 3.0 * radius if half_width is None else half_width
-    near = (np.abs(points["x"].values - x0) < 1.1 * half) & (np.abs(points["y"].values - y0) < 1.1 * half)
-    data = {name: points[name].values[near] for name in points.data_vars if points[name].dims == ("point",)}
-    displacement = 1e3 * np.hypot(data["displacement_x"], data["displacement_y"])
-    fields = (
-        ("displacement [mm]", displacement, "viridis", LogNorm(1.0, 1000.0), "both"),
-        ("deviatoric strain [-]", data["deviatoric_strain"], "magma_r", LogNorm(1e-3, 1.0), "both"),
-        # a negative value stands for water that is missing: it carries nothing
-        ("pore pressure [kPa]", np.maximum(data["pore_pressure"], 0.0) / 1e3, "YlGnBu", None, "neither"),
-        ("vertical effective stress [kPa]", -data["stress_yy"] / 1e3, "cividis", None, "max"),
-    )
+    data, fields = _fields(points, x0, y0, half)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 6.4), layout="constrained")
         axes = figure.subplots(2, 2, sharex=True, sharey=True)
         for axis, (title, values, colours, norm, extend) in zip(axes.flat, fields, strict=True):
             if norm is None:
-                top = np.nanmax(values) if extend == "neither" else np.nanpercentile(values, 99.5)
-                norm = Normalize(0.0, max(float(top), 1.0))
+                norm = Normalize(0.0, _top(values, extend) if tops is None else tops[title])
             drawn = _draw_points(axis, data, values, colours, norm)
             geometry.draw(axis, zorder=3)
             _frame(axis, x0, y0, half)
@@ -77,6 +70,39 @@ def fields_around_tunnel(points, half_width=None):
             axis.set_ylabel("y [m]")
         figure.suptitle(f"{float(points['time']):.3g} s after the gate opened", fontsize=9)
     return figure
+
+
+def common_tops(points):
+    """Top of the linear colour scales that suits all times: title of a panel to its value, for `fields_around_tunnel`.
+
+    points : xarray.Dataset, `/points` of a run.
+    """
+    x0, y0, radius = _Geometry(points).centre
+    tops = {}
+    for k in range(points.sizes["time"]):
+        _, fields = _fields(points.isel(time=k), x0, y0, 3.0 * radius)
+        for title, values, _, norm, extend in fields:
+            if norm is None:
+                tops[title] = max(tops.get(title, 0.0), _top(values, extend))
+    return tops
+
+
+def _fields(points, x0, y0, half):
+    """Points in a view, and what is drawn of them: title, values, colour map, norm (None: from 0), open ends."""
+    near = (np.abs(points["x"].values - x0) < 1.1 * half) & (np.abs(points["y"].values - y0) < 1.1 * half)
+    data = {name: points[name].values[near] for name in points.data_vars if points[name].dims == ("point",)}
+    displacement = 1e3 * np.hypot(data["displacement_x"], data["displacement_y"])
+    return data, (
+        ("displacement [mm]", displacement, FIELD_COLOURS[0], LogNorm(1.0, 1000.0), "both"),
+        ("deviatoric strain [-]", data["deviatoric_strain"], FIELD_COLOURS[1], LogNorm(1e-3, 1.0), "both"),
+        # a negative value stands for water that is missing: it carries nothing
+        ("pore pressure [kPa]", np.maximum(data["pore_pressure"], 0.0) / 1e3, FIELD_COLOURS[2], None, "neither"),
+        ("vertical effective stress [kPa]", -data["stress_yy"] / 1e3, FIELD_COLOURS[3], None, "max"),
+    )
+
+
+def _top(values, extend):
+    return max(float(np.nanmax(values) if extend == "neither" else np.nanpercentile(values, 99.5)), 1.0)
 
 
 def mesh_near_gate(mesh, half_width=None):
@@ -469,6 +495,6 @@ def _segments(angle, joints):
 
 
 __all__ = [
-    "deformed_ring", "draw_run", "fields_around_tunnel", "inflow", "internal_forces", "mesh_near_gate",
+    "common_tops", "deformed_ring", "draw_run", "fields_around_tunnel", "inflow", "internal_forces", "mesh_near_gate",
     "pressures_polar",
 ]  # fmt: skip

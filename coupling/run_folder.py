@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 RUN_FILE, MESH_FILE, SCENE_FILE, LOG_FILE, FIGURES = "run.nc", "mesh.vtu", "scene.toml", "run.log", "figures"
+REPORT_FILE, FIELDS = "report.html", "fields"
 LOCK_FILE = ".lock"
 
 
@@ -54,10 +55,13 @@ def claimed(folder, overwrite=False):
                 f"output folder '{folder}': not empty, it holds {shown}; choose another --out, "
                 "or ask for --overwrite (overwrite=True) to replace the run in it"
             )
-        for name in (RUN_FILE, MESH_FILE, SCENE_FILE, LOG_FILE):
+        for name in (RUN_FILE, MESH_FILE, SCENE_FILE, LOG_FILE, REPORT_FILE):
             (folder / name).unlink(missing_ok=True)
         for picture in (folder / FIGURES).glob("*.png"):
             picture.unlink()
+        for fields in (folder / FIELDS).glob("*"):
+            if fields.suffix in (".vtu", ".pvd", ".xdmf", ".h5", ".gif"):
+                fields.unlink()
         yield folder
     finally:
         with contextlib.suppress(OSError):

@@ -1,0 +1,81 @@
+"""What the command line says when something goes wrong, and its JSON output.
+
+Exit codes: 0 done, 2 refused input, 3 run failed, 130 interrupted.
+"""
+
+import contextlib
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+REFUSED, FAILED, INTERRUPTED = 2, 3, 130
+
+JsonPath = Annotated[Path | None, typer.Option("--json", help="Also write the result as JSON; - prints it.")]
+
+
+@contextlib.contextmanager
+def failures():
+    """Turn what a user can cause into one message and an exit code."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        _complain("interrupted; what was computed stays readable", INTERRUPTED)
+    except (ValueError, RuntimeError, MemoryError, OSError) as error:
+        code = _exit_code(error)
+        if code is None:
+            raise
+        _complain("\n".join([str(error) or "not enough memory", *getattr(error, "__notes__", ())]), code)
+
+
+def _exit_code(error):
+    """2 for refused input, 3 for a failed run, None for what is a mistake of the program."""
+    from coupling.datasets import RunFileError
+    from coupling.run_folder import RunRefused
+    from coupling.scene import SceneError
+    from mpm.mesh import MeshError
+    from mpm.solver import RunFailed
+    from structure import LiningFailure
+
+    if isinstance(error, (RunFileError, RunRefused, SceneError, MeshError, MemoryError, JsonRefused)):
+        return REFUSED
+    if isinstance(error, (RunFailed, LiningFailure)):
+        return FAILED
+    # what reaches here as OSError is a full disk or a missing right, found while writing
+    return FAILED if isinstance(error, OSError) else None
+
+
+class JsonRefused(ValueError):
+    """A --json path that cannot be written."""
+
+
+@contextlib.contextmanager
+def checked_json(path):
+    """Refuse a --json path before the work instead of after it."""
+    if path is not None and str(path) != "-":
+        if path.is_dir() or not path.absolute().parent.is_dir():
+            raise JsonRefused(f"--json '{path}': must be a file in an existing folder; choose another path")
+        if path.exists():
+            with path.open("rb") as file:
+                if file.read(1) not in (b"{", b""):
+                    raise JsonRefused(f"--json '{path}': exists and is not JSON; choose another path")
+    yield
+
+
+def write_json(path, data):
+    """Write a result as JSON to a file, to standard output for "-", nowhere for None."""
+    if path is None:
+        return
+    text = json.dumps(data, indent=2) + "\n"
+    if str(path) == "-":
+        sys.stdout.write(text)
+    else:
+        path.write_text(text, encoding="utf-8")
+
+
+def _complain(message, code):
+    Console(stderr=True).print(message, style="red", markup=False, highlight=False, soft_wrap=True)
+    raise typer.Exit(code)

@@ -1,0 +1,201 @@
+"""Pictures that the page draws itself: points around the tunnel at some times, and the mesh."""
+
+import numpy as np
+
+from coupling.report.packing import BASE64, evenly, packed, quantised
+
+BYTES_OF_FIELDS = 4.2e6  # base64 text of all snapshots
+MOST_SNAPSHOTS = 12
+MOST_ELEMENTS = 60_000
+VIEW_RADII = 3.0  # half the width of the view, in outer radii
+COLOURS = 32
+
+
+def point_fields(points):
+    """Scalars that are drawn on the points of one time.
+
+    Returns
+    -------
+    dict
+        name: (label, unit, values (n,), colour map, "log" or "linear").
+    """
+    data = {name: points[name].values.astype(float) for name in points.data_vars if points[name].dims == ("point",)}
+    known = {
+        "displacement": (
+            "displacement", "mm", lambda: 1e3 * np.hypot(data["displacement_x"], data["displacement_y"]),
+            "viridis", (1.0, 1000.0),
+        ),
+        # a negative value stands for water that is missing: it carries nothing
+        "pore_pressure": ("pore pressure", "kPa", lambda: np.maximum(data["pore_pressure"], 0) / 1e3, "YlGnBu", None),
+        "porosity": ("porosity", "-", lambda: data["porosity"], "YlOrBr", None),
+        "deviatoric_strain": (
+            "deviatoric strain", "-", lambda: data["deviatoric_strain"], "magma_r", (1e-3, 1.0),
+        ),
+        "vertical_stress": ("vertical effective stress", "kPa", lambda: -data["stress_yy"] / 1e3, "cividis", None),
+        "speed": (
+            "speed of the grains", "m/s", lambda: np.hypot(data["velocity_solid_x"], data["velocity_solid_y"]),
+            "plasma", (1e-2, 10.0),
+        ),
+    }  # fmt: skip
+    needs = {"displacement": "displacement_x", "vertical_stress": "stress_yy", "speed": "velocity_solid_x"}
+    fields = {}
+    for name, (label, unit, values, colours, log_range) in known.items():
+        if needs.get(name, name) in data:
+            fields[name] = {"label": label, "unit": unit, "values": values(), "colours": colours, "range": log_range}
+    return fields
+
+
+def field_snapshots(points, budget=BYTES_OF_FIELDS):
+    """Snapshots of the points near the tunnel, small enough for a page.
+
+    Parameters
+    ----------
+    points : xarray.Dataset
+        `/points` of a run.
+    budget : float
+        Bytes of base64 text at most.
+
+    Returns
+    -------
+    dict or None
+        view: {x, y, half} [m]; fields: name to {label, unit, low, high, log, colours}; snapshots: list of {time,
+        present, drawn, x, y, side, <field> ..}, packed: x and y as 65535ths of the view's width, side (of a square with
+        the point's area) as 255ths of `largest_side`, a field as 255ths of its range. None without snapshots.
+    """
+    if "x" not in points or not points.sizes.get("time"):
+        return None
+    view = _view(points)
+    kept = evenly(points.sizes["time"], MOST_SNAPSHOTS)
+    near = [_near(points.isel(time=int(k)), view) for k in kept]
+    fields = [point_fields(snapshot) for snapshot in near]
+    scales = {name: _scale(name, [f[name] for f in fields]) for name in fields[0]}
+    most = int(budget / len(kept) / BASE64 / (5 + len(scales)))
+    largest = max(float(np.sqrt(snapshot["volume"].max())) for snapshot in near)
+    return {
+        "view": view,
+        "largest_side": largest,
+        "fields": scales,
+        "snapshots": [_snapshot(n, f, scales, view, largest, most) for n, f in zip(near, fields, strict=True)],
+        "available": int(points.sizes["time"]),
+    }
+
+
+def _view(points):
+    attrs = points.attrs
+    if "tunnel_x" in attrs:
+        k = int(attrs.get("gate_tunnel", 0))
+        radius = float(np.atleast_1d(attrs["tunnel_outer_radius"])[k])
+        x, y = np.atleast_1d(attrs["tunnel_x"])[k], -np.atleast_1d(attrs["tunnel_axis_depth"])[k]
+        return {"x": float(x), "y": float(y), "half": VIEW_RADII * radius}
+    extent = [(float(points[name].min()), float(points[name].max())) for name in ("x", "y")]
+    middle = [0.5 * (low + high) for low, high in extent]
+    return {"x": middle[0], "y": middle[1], "half": max(0.52 * (high - low) for low, high in extent) or 1.0}
+
+
+def _near(snapshot, view):
+    """Points of one time inside the view, the largest first, so that small ones are drawn on top."""
+    x, y, half = snapshot["x"].values, snapshot["y"].values, view["half"]
+    inside = np.flatnonzero((np.abs(x - view["x"]) < half) & (np.abs(y - view["y"]) < half))
+    order = np.argsort(-snapshot["volume"].values[inside], kind="stable")
+    return snapshot.isel(point=inside[order])
+
+
+def _scale(name, fields):
+    """One range of values for all times, so that colours can be compared through time."""
+    first = fields[0]
+    if first["range"] is not None:
+        low, high = first["range"]
+    else:
+        values = np.concatenate([field["values"] for field in fields])
+        low = 0.0 if name != "porosity" else float(np.nanmin(values))
+        high = max(float(np.nanpercentile(values, 99.5)), low + 1e-6)
+    return {
+        "label": first["label"],
+        "unit": first["unit"],
+        "low": low,
+        "high": high,
+        "log": first["range"] is not None,
+        "colours": _colour_stops(first["colours"]),
+    }
+
+
+def _colour_stops(name):
+    import matplotlib
+
+    return [[int(c) for c in rgba[:3]] for rgba in matplotlib.colormaps[name](np.linspace(0, 1, COLOURS), bytes=True)]
+
+
+def scaled(values, scale):
+    """Values as 255ths of a scale, logarithmic where it says so: (n,) uint8."""
+    if scale["log"]:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            logarithm = np.maximum(np.log10(values), np.log10(scale["low"]))
+        return quantised(logarithm, np.log10(scale["low"]), np.log10(scale["high"]))
+    return quantised(values, scale["low"], scale["high"])
+
+
+def _snapshot(near, fields, scales, view, largest, most):
+    count = near.sizes["point"]
+    drawn = evenly(count, most)
+    # fewer points are drawn larger, so that they still cover the ground
+    spread = np.sqrt(count / max(len(drawn), 1))
+    left, bottom, width = view["x"] - view["half"], view["y"] - view["half"], 2 * view["half"]
+    side = np.sqrt(near["volume"].values[drawn])
+    return {
+        "time": float(near["time"]),
+        "present": count,
+        "drawn": len(drawn),
+        "spread": float(spread),
+        "x": packed(quantised(near["x"].values[drawn], left, left + width, "u2"), "u2"),
+        "y": packed(quantised(near["y"].values[drawn], bottom, bottom + width, "u2"), "u2"),
+        "side": packed(quantised(side, 0.0, largest), "u1"),
+        **{name: packed(scaled(fields[name]["values"][drawn], scale), "u1") for name, scale in scales.items()},
+    }
+
+
+def mesh_picture(mesh):
+    """Nodes and triangles for the page, and what the mesh is made of.
+
+    Returns
+    -------
+    dict
+        elements, nodes (count of all); min_altitude [m]; min_angle [degree]; x, y (n_nodes,), corners (n, 3), region
+        (n,) packed; whole: False where only triangles near the tunnel are kept.
+    """
+    x, y = mesh["x"].values, mesh["y"].values
+    corners, region = mesh["element_nodes"].values, mesh["region"].values
+    altitude, angle = triangle_quality(x, y, corners)
+    whole = len(corners) <= MOST_ELEMENTS
+    kept = np.arange(len(corners)) if whole else _nearest_elements(mesh, corners)
+    used, renumbered = np.unique(corners[kept], return_inverse=True)
+    return {
+        "elements": len(corners),
+        "nodes": len(x),
+        "min_altitude": float(altitude.min()),
+        "min_angle": float(angle.min()),
+        "whole": whole,
+        "x": packed(x[used]),
+        "y": packed(y[used]),
+        "corners": packed(renumbered.reshape(-1, 3), "u4" if len(used) > 65535 else "u2"),
+        "region": packed(region[kept], "u1"),
+    }
+
+
+def triangle_quality(x, y, corners):
+    """Smallest altitude [m] and smallest angle [degree] of every triangle, each (n,) float64."""
+    p = np.stack([x, y], axis=1)[corners]
+    edge = np.roll(p, -1, axis=1) - p
+    length = np.hypot(edge[..., 0], edge[..., 1])
+    double_area = np.abs(edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0])
+    # at every corner: the area is half the product of its two edges and the sine between them
+    sine = double_area[:, None] / (length * np.roll(length, 1, axis=1))
+    cosine = -np.sum(edge * np.roll(edge, 1, axis=1), axis=2) / (length * np.roll(length, 1, axis=1))
+    return double_area / length.max(axis=1), np.degrees(np.arctan2(sine, cosine)).min(axis=1)
+
+
+def _nearest_elements(mesh, corners):
+    k = int(mesh.attrs.get("gate_tunnel", 0))
+    x = np.atleast_1d(mesh.attrs.get("tunnel_x", 0.0))[k]
+    depth = np.atleast_1d(mesh.attrs.get("tunnel_axis_depth", 0.0))[k]
+    middle_x, middle_y = mesh["x"].values[corners].mean(axis=1), mesh["y"].values[corners].mean(axis=1)
+    return np.sort(np.argsort(np.hypot(middle_x - x, middle_y + depth), kind="stable")[:MOST_ELEMENTS])

@@ -1,0 +1,308 @@
+"""Key numbers of a run with what the run itself can say about their error, its quality line and its warnings."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from coupling.datasets import HISTORY
+from coupling.report.series import match_times, model_names
+from coupling.summary import PLACES
+
+#: Variable and which extreme of it: (label, unit shown, factor from SI).
+RING_EXTREMES = {
+    "axial_force_max": ("axial force N, largest", "kN/m", 1e-3),
+    "axial_force_min": ("axial force N, smallest", "kN/m", 1e-3),
+    "shear_force_max": ("shear force Q, largest", "kN/m", 1e-3),
+    "shear_force_min": ("shear force Q, smallest", "kN/m", 1e-3),
+    "bending_moment_max": ("bending moment M, largest", "kN m/m", 1e-3),
+    "bending_moment_min": ("bending moment M, smallest", "kN m/m", 1e-3),
+    "joint_opening_max": ("joint opening, largest", "mm", 1e3),
+    "joint_rotation_max": ("joint rotation, largest size", "mrad", 1e3),
+    "convergence_horizontal": ("horizontal diameter shortens by", "mm", 1e3),
+    "convergence_vertical": ("vertical diameter shortens by", "mm", 1e3),
+}
+RESIDUAL_LIMIT = 1e-6  # of the loads; the ring's iteration stops well below
+MASS_LIMIT = 1e-9  # relative; grains are only moved, so round-off is all that may show
+SHEAR_LIMIT = 0.05  # of the largest Q; the slope of M is taken over one element
+THEORY_LIMIT = 0.02  # of the mean pressure; an element at the lining sees the depth of its middle
+
+
+class Number(NamedTuple):
+    """A number of the run: SI values and how they are shown.
+
+    initial, final : float or None;  scale : factor from SI to `unit`;  error : float (SI) or None;  basis : str.
+    """
+
+    key: str
+    label: str
+    unit: str
+    scale: float
+    initial: float | None
+    final: float | None
+    error: float | None
+    basis: str
+
+
+def key_numbers(run):
+    """What the run came to.
+
+    Parameters
+    ----------
+    run : xarray.DataTree
+        From :func:`coupling.read_run`, with at least one record.
+
+    Returns
+    -------
+    dict
+        Title of a group to its list of Number; groups without numbers are left out.
+    """
+    groups = {
+        "Gushing": _inflow_numbers(run),
+        "Pressures on the lining": _pressure_numbers(run["lining"].to_dataset()),
+        "Forces and deformation of the ring": _ring_numbers(run),
+    }
+    return {title: numbers for title, numbers in groups.items() if numbers}
+
+
+def _inflow_numbers(run):
+    history = run["history"].to_dataset()
+    last, mass = history.isel(time=-1), history["grain_mass"].values
+    one_point = _mass_of_a_point_inside(run)
+    numbers = [
+        Number("inflow_mass", "inflow mass", "kg/m", 1.0, None, float(last["inflow_mass"]),
+               float(np.abs(mass - mass[0]).max()) + one_point, "change of all mass, and one point"),
+    ]  # fmt: skip
+    rate = inflow_rate(history)
+    if rate is not None:
+        numbers.append(Number("inflow_rate", "inflow rate, second half of the time", "kg/m/s", 1.0, None, *rate,
+                              "scatter between four parts"))  # fmt: skip
+    for name, label in (("flow_zone_area", "flow zone (moved over 50 mm)"),
+                        ("disturbed_area", "disturbed zone (10 to 50 mm)")):  # fmt: skip
+        numbers.append(Number(name, label, "m²", 1.0, None, float(last[name]), None, ""))
+    numbers.append(Number("max_velocity", "largest velocity of the grains", "m/s", 1.0, None,
+                          float(last["max_velocity"]), None, ""))  # fmt: skip
+    return numbers
+
+
+def _mass_of_a_point_inside(run):
+    """Largest grain mass of a point inside the gate's tunnel at the last snapshot [kg/m]: inflow is counted in them."""
+    points = run["points"].to_dataset() if "points" in run.children else None
+    if points is None or "grain_mass" not in points or not points.sizes["time"] or "tunnel_x" not in points.attrs:
+        return 0.0
+    attrs, k = points.attrs, int(points.attrs.get("gate_tunnel", 0))
+    x, depth, inner = (np.atleast_1d(attrs[f"tunnel_{n}"])[k] for n in ("x", "axis_depth", "inner_radius"))
+    last = points.isel(time=-1)
+    inside = np.hypot(last["x"].values - x, last["y"].values + depth) < inner
+    return float(np.nanmax(last["grain_mass"].values[inside])) if inside.any() else 0.0
+
+
+def inflow_rate(history):
+    """Mean inflow rate over the second half of the time and its standard deviation between four equal parts [kg/m/s].
+
+    None with fewer than nine records in that half.
+    """
+    time, mass = history["time"].values, history["inflow_mass"].values
+    if np.sum(time >= 0.5 * time[-1]) < 9:
+        return None
+    parts = np.linspace(0.5 * time[-1], time[-1], 5)
+    rates = np.diff(np.interp(parts, time, mass)) / np.diff(parts)
+    return float(rates.mean()), float(rates.std(ddof=1))
+
+
+def scatter(values, spread):
+    """Standard deviation of one record: of its differences to its neighbours, and within its output interval.
+
+    Parameters
+    ----------
+    values : (n,) float64
+        A quantity over time; the last fifth, at least five records, is used. Differences of neighbours leave its trend
+        out; of independent errors they have twice the variance.
+    spread : float
+        Standard deviation within the last output interval.
+
+    Returns
+    -------
+    float
+        None with fewer than five records.
+    """
+    if len(values) < 5:
+        return None
+    last = values[-max(5, len(values) // 5) :]
+    return float(np.hypot(np.std(np.diff(last)) / np.sqrt(2), spread))
+
+
+def _pressure_numbers(lining):
+    if "soil_pressure" not in lining:
+        return []
+    if "tunnel" in lining.dims:
+        lining = lining.isel(tunnel=int(lining.attrs.get("gate_tunnel", 0)))
+    numbers = []
+    for name, label in (("soil_pressure", "soil"), ("water_pressure", "water")):
+        for place, theta in PLACES.items():
+            series, spread = lining[name].sel(theta=theta).values, lining[f"{name}_std"].sel(theta=theta).values
+            open_here = len(series) > 1 and _in_gap(lining.attrs, theta)
+            numbers.append(
+                Number(
+                    f"{name}_{theta}", f"{label}, {place}{' (the gap)' if open_here else ''}", "kPa", 1e-3,
+                    float(series[0]), None if open_here else float(series[-1]),
+                    None if open_here else scatter(series, spread[-1]), "scatter of the last records",
+                )
+            )  # fmt: skip
+    return numbers
+
+
+def _in_gap(geometry, theta):
+    """Whether an angle [degree] lies in the gap, where the open lining carries no pressure."""
+    if "gate_angle" not in geometry:
+        return False
+    outer = float(np.atleast_1d(geometry["tunnel_outer_radius"])[int(geometry["gate_tunnel"])])
+    half = np.degrees(np.arcsin(min(1.0, 0.5 * float(geometry["gate_width"]) / outer)))
+    return abs((theta - float(geometry["gate_angle"]) + 180) % 360 - 180) <= half
+
+
+def initial_theory(scene, theta):
+    """Theoretical pressures before the gate opens, or None where the closed form does not hold.
+
+    It holds for one tunnel in one soil that is dry, or saturated up to the surface.
+
+    scene : coupling.Scene or None;  theta : (n,) float64 [degree];  returns xarray.Dataset or None.
+    """
+    if scene is None or len(scene.mpm.soils) != 1 or len(scene.mpm.tunnels) != 1:
+        return None
+    s = scene.mpm
+    soil, tunnel = s.soils[0], s.tunnels[0]
+    if s.water is not None and s.water.table_depth > 0:
+        return None
+    from structure import theoretical_pressures
+
+    density = 0.0 if s.water is None else s.water.density
+    return theoretical_pressures(
+        outer_diameter=tunnel.outer_diameter,
+        cover=tunnel.cover,
+        buoyant_unit_weight=(1 - soil.porosity) * (soil.grain_density - density) * s.gravity,
+        coefficient_at_rest=soil.k0,
+        water_unit_weight=density * s.gravity,
+        theta=theta,
+    )
+
+
+def ring_extremes(response, record):
+    """Extreme forces and joint deformations of one record: key of `RING_EXTREMES` to SI value."""
+    state, values = response.isel(time=record), {}
+    for key in RING_EXTREMES:
+        name, _, extreme = key.rpartition("_")
+        if key in state:
+            values[key] = float(state[key])
+        elif name in state and state[name].size:
+            found = np.abs(state[name].values) if name == "joint_rotation" else state[name].values
+            values[key] = float(np.nanmax(found) if extreme == "max" else np.nanmin(found))
+    return values
+
+
+def _ring_numbers(run):
+    models = model_names(run)
+    if not models:
+        return []
+    responses = {name: run[f"structure/{name}"].to_dataset() for name in models}
+    first = responses[models[0]]
+    if not first.sizes["time"]:
+        return []
+    start, end = ring_extremes(first, 0), ring_extremes(first, -1)
+    others = []
+    for name in models[1:]:
+        rows, present = match_times(responses[name]["time"].values, first["time"].values[-1:])
+        if present[0]:
+            others.append(ring_extremes(responses[name], int(rows[0])))
+    basis = f"difference from {', '.join(models[1:])}" if others else "none: one lining model, nothing to compare with"
+    return [
+        Number(key, label, unit, scale, start[key], end[key],
+               max((abs(other[key] - end[key]) for other in others if key in other), default=None), basis)
+        for key, (label, unit, scale) in RING_EXTREMES.items() if key in end
+    ]  # fmt: skip
+
+
+def quality(run, summary, scene=None):
+    """Balances and limits that say how far the numbers can be trusted.
+
+    Parameters
+    ----------
+    run : xarray.DataTree
+    summary : dict
+        From :func:`coupling.summary.summarise_run`.
+    scene : coupling.Scene or None
+        For the theory of the initial pressures.
+
+    Returns
+    -------
+    list of (str, str, bool or None)
+        What, how much, and whether it is within what is expected; None where nothing is expected of it.
+    """
+    rows = [("mass of the grains, largest relative change", f"{summary['grain_mass_error']:.1e}",
+             summary["grain_mass_error"] <= MASS_LIMIT)]  # fmt: skip
+    rows += _against_theory(run["lining"].to_dataset(), scene)
+    for name in model_names(run):
+        response = run[f"structure/{name}"].to_dataset()
+        if not response.sizes["time"]:
+            continue
+        if "equilibrium_residual" in response:
+            worst = float(np.abs(response["equilibrium_residual"]).max())
+            rows.append((f"equilibrium of the ring, {name}: largest unbalanced share", f"{worst:.1e}",
+                         worst <= RESIDUAL_LIMIT))  # fmt: skip
+        if "shear_moment_residual" in response:
+            share = float(np.abs(response["shear_moment_residual"]).max() / np.nanmax(np.abs(response["shear_force"])))
+            rows.append((f"Q = -dM/ds, {name}: largest departure over the largest Q", f"{share:.1e}",
+                         share <= SHEAR_LIMIT))  # fmt: skip
+    for name, count in summary["clamps"].items():
+        share = 100 * count / max(summary["point_steps"], 1)
+        rows.append((f"limit '{name.replace('_', ' ')}' acted", f"{count} times, {share:.2g} % of the updates", None))
+    for name, variable in run["history"].to_dataset().data_vars.items():
+        if name not in HISTORY and variable.dims == ("time",):
+            worst, unit = float(np.abs(variable).max()), variable.attrs.get("units", "")
+            rows.append((f"{variable.attrs.get('long_name', name)}: largest size",
+                         f"{worst:.3g} {'' if unit == '1' else unit}".strip(), None))  # fmt: skip
+    return rows
+
+
+def _against_theory(lining, scene):
+    """Initial pressures of the first record against K0 and hydrostatic theory, the mean of which is the measure."""
+    theory = initial_theory(scene, lining["theta"].values) if "soil_pressure" in lining else None
+    if theory is None:
+        return []
+    rows = []
+    for name, label in (("soil_pressure", "soil"), ("water_pressure", "water")):
+        expected = theory[name].isel(time=0).values
+        worst, mean = float(np.abs(lining[name].isel(time=0).values - expected).max()), float(expected.mean())
+        if mean > 0:
+            what = f"initial {label} pressure against theory, largest difference at any angle"
+            size = f"{worst / 1e3:.2g} kPa, {100 * worst / mean:.2g} % of the mean"
+            rows.append((what, size, worst <= THEORY_LIMIT * mean))
+    return rows
+
+
+def warnings(run, attributes, quality_rows):
+    """What a reader must know before believing the page: list of str."""
+    found = []
+    if attributes["status"] != "finished":
+        message = attributes.get("status_message") or "the page shows what was computed until then"
+        found.append(f"The run is '{attributes['status']}': {message}.")
+    found += [f"Outside what is expected: {what}: {value}." for what, value, good in quality_rows if good is False]
+    lining = run["lining"].to_dataset()
+    records = lining.sizes["time"]
+    models = model_names(run)
+    if "soil_pressure" in lining and not models:
+        found.append("No lining model has answered to the pressures: run `gush respond` on this run.")
+    for name in models:
+        answered = run[f"structure/{name}"].sizes.get("time", 0)
+        if answered != records:
+            found.append(f"The response of {name} holds {answered} of {records} records: run `gush respond` again.")
+    if "soil_pressure" in lining and records > 1:
+        last = lining.isel(time=-1)
+        for name, label in (("soil_pressure", "soil"), ("water_pressure", "water")):
+            share = float(last[f"{name}_std"].mean() / max(float(np.abs(last[name]).mean()), 1e-9))
+            if share > 0.25:
+                found.append(f"The {label} pressure still fluctuates: by {share:.0%} of its mean within an interval.")
+    if records < 10:
+        found.append(f"Only {records} records: what happens between them is not shown.")
+    if str(attributes.get("revision", "")).endswith("+changed"):
+        found.append(f"The program's files differed from its revision {attributes['revision']}.")
+    return found

@@ -1,0 +1,67 @@
+// The numbers of the page: text back to arrays, SI; factors to the units shown.
+const data = JSON.parse(document.getElementById("data").textContent);
+const KINDS = { f4: Float32Array, u1: Uint8Array, u2: Uint16Array, u4: Uint32Array };
+
+function unpack(entry) {
+  const text = atob(entry.data), bytes = new Uint8Array(text.length);
+  for (let k = 0; k < text.length; k++) bytes[k] = text.charCodeAt(k);
+  const values = new KINDS[entry.kind](bytes.buffer), width = entry.shape.length > 1 ? entry.shape[1] : 1;
+  return { values, width, row: (k) => values.subarray(k * width, (k + 1) * width) };
+}
+
+function unpackAll(entries) {
+  return Object.fromEntries(Object.entries(entries).map(([name, entry]) => [name, unpack(entry)]));
+}
+
+const times = unpack(data.time).values, inflow = unpack(data.inflow_mass).values;
+const tunnels = data.lining ? data.lining.tunnels.map(unpackAll) : [];
+const models = data.models.map((model) => ({
+  ...model, fields: unpackAll(model.fields), joints: unpackAll(model.joints),
+  series: Object.fromEntries(Object.entries(model.series).map(([k, v]) => [k, { ...v, ...unpack(v) }])),
+}));
+const history = {
+  time: unpack(data.history.time).values,
+  series: Object.fromEntries(Object.entries(data.history.series).map(([k, v]) => [k, { ...v, ...unpack(v) }])),
+};
+const gate = data.section.gate;
+const home = data.section.tunnels[gate ? gate.tunnel : 0];
+
+const QUANTITIES = {
+  soil_pressure: ["kPa", 1e-3], water_pressure: ["kPa", 1e-3], soil_shear: ["kPa", 1e-3],
+  axial_force: ["kN/m", 1e-3], shear_force: ["kN/m", 1e-3], bending_moment: ["kN m/m", 1e-3],
+  joint_axial_force: ["kN/m", 1e-3], joint_shear_force: ["kN/m", 1e-3], joint_bending_moment: ["kN m/m", 1e-3],
+  joint_opening: ["mm", 1e3], joint_dislocation: ["mm", 1e3], joint_rotation: ["mrad", 1e3],
+  convergence_horizontal: ["mm", 1e3], convergence_vertical: ["mm", 1e3], settlement: ["mm", 1e3],
+};
+
+// As coupling.report.markup.shown: three significant digits, whole numbers from 100 on, a true minus sign.
+function shown(value) {
+  if (!Number.isFinite(value)) return "–";
+  const size = Math.abs(value);
+  if (size === 0) return "0";
+  if (size >= 1e6 || size < 1e-4) return value.toExponential(2).replace("e+", "e").replace(/-/g, "−");
+  if (size >= 100) return value.toFixed(0).replace("-", "−");
+  return String(Number(value.toPrecision(3))).replace("-", "−");
+}
+
+function rangeOf(arrays, factor) {
+  let low = Infinity, high = -Infinity;
+  for (const values of arrays) {
+    for (const value of values) {
+      if (value < low) low = value;
+      if (value > high) high = value;
+    }
+  }
+  return low <= high ? [low * factor, high * factor] : [0, 1];
+}
+
+function extremes(values, factor, angles) {
+  let low = -1, high = -1;
+  for (let k = 0; k < values.length; k++) {
+    if (Number.isNaN(values[k])) continue;
+    if (low < 0 || values[k] < values[low]) low = k;
+    if (high < 0 || values[k] > values[high]) high = k;
+  }
+  if (low < 0) return null;
+  return { min: values[low] * factor, max: values[high] * factor, minAt: angles[low], maxAt: angles[high] };
+}

@@ -1,0 +1,173 @@
+"""What the page about a run is made of: key numbers, warnings, and the datasets' values within a budget of bytes."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from report_run import TIMES, write_run
+from synthetic_run import points
+from typer.testing import CliRunner
+
+import coupling
+from coupling import datasets
+from coupling.cli import app
+from coupling.report import fields, numbers, page, series
+from coupling.report.packing import evenly, unpacked
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    return write_run(tmp_path_factory.mktemp("run") / "run.nc")
+
+
+@pytest.fixture(scope="module")
+def tree(run):
+    return coupling.read_run(run)
+
+
+# -- the numbers ------------------------------------------------------------------------------------
+
+
+def test_scatter_leaves_a_trend_out_and_finds_the_noise():
+    noise = np.random.default_rng(1).normal(scale=3.0, size=2000)
+    # of 400 records; standard deviation of the estimate 3 / sqrt(800) times about 1.2
+    assert numbers.scatter(noise + 50.0 * np.arange(2000), 0.0) == pytest.approx(3.0, abs=0.4)
+    assert numbers.scatter(2.0 * np.arange(20), 4.0) == pytest.approx(4.0)
+    assert numbers.scatter(np.arange(4.0), 1.0) is None
+
+
+def test_inflow_rate_of_a_straight_line_has_no_error():
+    time = np.linspace(0, 2, 41)
+    history = xr.Dataset({"inflow_mass": ("time", 300 * np.maximum(time - 0.5, 0))}, coords={"time": time})
+    rate, error = numbers.inflow_rate(history)
+    assert rate == pytest.approx(300.0) and error < 1e-9
+    assert numbers.inflow_rate(history.isel(time=slice(0, 12))) is None
+
+
+def test_quality_of_triangles():
+    x, y = np.array([0.0, 1.0, 0.5, 1.0]), np.array([0.0, 0.0, np.sqrt(0.75), 1.0])
+    altitude, angle = fields.triangle_quality(x, y, np.array([[0, 1, 2], [0, 1, 3]]))
+    np.testing.assert_allclose(altitude, [np.sqrt(0.75), np.sqrt(0.5)])
+    np.testing.assert_allclose(angle, [60.0, 45.0])
+
+
+def test_initial_theory_is_given_only_where_it_holds(quick_scene):
+    theta = np.array([0.0, 90.0])
+    theory = numbers.initial_theory(quick_scene, theta)
+    vertical = (1 - 0.45) * (2650 - 1000) * 9.81 * np.array([20.0, 23.3])
+    np.testing.assert_allclose(theory["soil_pressure"][0], [vertical[0], 0.577 * vertical[1]])
+    np.testing.assert_allclose(theory["water_pressure"][0], 9810.0 * np.array([20.0, 23.3]))
+    assert numbers.initial_theory(coupling.load_scene("twin-tunnels"), theta) is None
+
+
+def test_warnings_name_what_is_missing_or_off(run, tree, tmp_path):
+    good = page.collect(run)
+    assert [text for text in good["warnings"] if "records" not in text and "revision" not in text] == [
+        text for text in good["warnings"] if text.startswith("Outside")
+    ]
+    # the synthetic pressures are no K0 state, which must be said
+    assert any("against theory" in text for text in good["warnings"])
+    short = write_run(tmp_path / "run.nc", times=(0.0, 0.5), models=(), status="interrupted")
+    told = " ".join(page.collect(short)["warnings"])
+    assert "'interrupted'" in told and "No lining model" in told and "Only 2 records" in told
+    datasets.write_response(short, tree["structure/beam-spring"].to_dataset().isel(time=[0]))
+    assert "beam-spring holds 1 of 2 records" in " ".join(page.collect(short)["warnings"])
+
+
+# -- what is put into the page ----------------------------------------------------------------------
+
+
+def test_evenly_chosen_records_hold_the_ends():
+    np.testing.assert_array_equal(evenly(5, 9), np.arange(5))
+    chosen = evenly(1000, 7)
+    assert len(chosen) == 7 and chosen[0] == 0 and chosen[-1] == 999 and np.ptp(np.diff(chosen)) <= 1
+
+
+def test_embedded_series_are_the_datasets_values(run, tree):
+    player = page.collect(run)["player"]
+    lining, tunnel = tree["lining"], player["lining"]["tunnels"][0]
+    for name in series.PRESSURES:
+        np.testing.assert_array_equal(unpacked(tunnel[name]), lining[name].values.astype("f4"))
+    for model in player["models"]:
+        response = tree[f"structure/{model['name']}"]
+        for name, entry in {**model["fields"], **model["joints"], **model["series"]}.items():
+            np.testing.assert_array_equal(unpacked(entry), response[name].values.astype("f4"))
+
+
+def test_a_response_that_stops_early_is_missing_afterwards(tree):
+    response = tree["structure/beam-spring"].to_dataset().isel(time=slice(0, 2))
+    shown = unpacked(series.model_series("beam-spring", response, np.array(TIMES))["fields"]["axial_force"])
+    np.testing.assert_array_equal(shown[:2], response["axial_force"].values.astype("f4"))
+    assert np.isnan(shown[2:]).all()
+
+
+def test_embedded_fields_are_within_half_a_step_of_the_points(tree):
+    stored = tree["points"].to_dataset()
+    packed = fields.field_snapshots(stored)
+    view = packed["view"]
+    for k, snapshot in enumerate(packed["snapshots"]):
+        shot = stored.isel(time=k)
+        near = (np.abs(shot["x"] - view["x"]) < view["half"]) & (np.abs(shot["y"] - view["y"]) < view["half"])
+        shot = shot.isel(point=np.flatnonzero(near))
+        step = 2 * view["half"] / 65535
+        x = view["x"] - view["half"] + step * unpacked(snapshot["x"]).astype(float)
+        order = np.argsort(x, kind="stable")
+        np.testing.assert_allclose(x[order], np.sort(shot["x"].values), atol=0.5 * step + 1e-5)
+        scale = packed["fields"]["pore_pressure"]
+        width = (scale["high"] - scale["low"]) / 255
+        shown = scale["low"] + width * np.sort(unpacked(snapshot["pore_pressure"])).astype(float)
+        expected = np.minimum(np.sort(np.maximum(shot["pore_pressure"].values / 1e3, 0)), scale["high"])
+        np.testing.assert_allclose(shown, expected, atol=0.5 * width + 1e-3)
+        scale = packed["fields"]["displacement"]
+        assert scale["log"] and (scale["low"], scale["high"]) == (1.0, 1000.0)
+        size = np.clip(1e3 * np.hypot(shot["displacement_x"], shot["displacement_y"]), 1.0, 1000.0)
+        shown = 10 ** (3 / 255 * np.sort(unpacked(snapshot["displacement"])).astype(float))
+        # half of 255 steps over three decades
+        np.testing.assert_allclose(shown, np.sort(size), rtol=10 ** (1.5 / 255) - 1 + 1e-6)
+
+
+def test_the_page_of_a_long_run_stays_under_ten_megabytes(tree, tmp_path):
+    records, theta = 5000, np.arange(360.0)
+    time = np.linspace(0, 100, records)
+    zero = np.zeros((records, 360), "f4")
+    pressures = {name: (("time", "theta"), zero) for name in datasets.PRESSURES}
+    progress = {name: ("time", np.linspace(0, 1, records)) for name in datasets.PROGRESS}
+    geometry = tree["lining"].attrs
+    lining = xr.Dataset({**pressures, **progress}, coords={"time": time, "theta": theta}, attrs=geometry)
+    history = xr.Dataset({name: ("time", np.ones(records)) for name in datasets.HISTORY}, coords={"time": time})
+    response = tree["structure/beam-spring"].to_dataset().isel(time=np.zeros(records, int)).assign_coords(time=time)
+    shot = {name: np.tile(values, 250) for name, values in points(1.0).items() if name != "removed"}
+    many = xr.Dataset({name: (("time", "point"), np.stack([values] * 30)) for name, values in shot.items()},
+                      coords={"time": np.linspace(0, 100, 30)}, attrs=geometry)  # fmt: skip
+    nodes = np.random.default_rng(2).uniform(size=(2, 200_000))
+    mesh = xr.Dataset({"x": ("node", nodes[0]), "y": ("node", nodes[1]), "region": ("element", np.zeros(400_000, "i1")),
+                       "element_nodes": (("element", "corner"), np.arange(1_200_000).reshape(-1, 3) % 200_000)},
+                      attrs=geometry)  # fmt: skip
+    models = {f"/structure/{name}": response for name in ("beam-spring", "continuum", "third")}
+    long = xr.DataTree.from_dict({"/lining": lining, "/history": history, "/points": many, "/mesh": mesh, **models})
+    frames = series.choose_frames(long)
+    player = page._player(long, None, frames, fields.field_snapshots(many))
+    size = len(json.dumps(player))
+    # the rest of a page, style, script and text, is below 0.2 MB
+    assert 2e6 < size < 9.8e6
+    assert frames[-1] == records - 1 and len(frames) > 20
+
+
+def test_only_an_earlier_report_is_replaced(run, tmp_path):
+    path = page.write_report(run, tmp_path)
+    assert path == tmp_path / "report.html" and page.is_report(path)
+    (tmp_path / "mine.html").write_text("<p>mine</p>")
+    for out, message in ((tmp_path / "mine.html", "is no report"), (tmp_path / "no" / "a.html", "does not exist")):
+        refused = CliRunner().invoke(app, ["report", str(run), "--out", str(out)])
+        assert refused.exit_code == 2 and message in refused.output
+    assert (tmp_path / "mine.html").read_text() == "<p>mine</p>"
+    done = CliRunner().invoke(app, ["report", str(run), "--out", str(path), "--json", "-"])
+    assert done.exit_code == 0 and json.loads(done.output)["bytes"] == path.stat().st_size < 10e6
+
+
+def test_a_file_without_a_record_is_refused(tmp_path):
+    empty = write_run(tmp_path / "run.nc", times=(), models=())
+    for path, message in ((empty, "no complete record yet"), (tmp_path / "none", "no such file")):
+        refused = CliRunner().invoke(app, ["report", str(path)])
+        assert refused.exit_code == 2 and message in refused.output
