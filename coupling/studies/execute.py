@@ -117,7 +117,7 @@ def _on_cluster(plan, missing, folder, workers, scheduler):
         if scheduler is None:
             count = min(workers or os.cpu_count() or 1, len(missing))
             cluster = LocalCluster(
-                n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None, memory_limit=0,
+                n_workers=count, threads_per_worker=1, processes=True, dashboard_address=":0", memory_limit=0,
             )  # fmt: skip
         try:
             with Client(cluster if cluster is not None else scheduler) as client:
