@@ -171,6 +171,7 @@ class Solver:
         self._normal_open = np.array(opened, float).reshape(-1, 2)
         self.active = np.array(active_closed, np.int8)
         self._active_open = np.array(active_open, np.int8)
+        self._closed = self.normal, self.active
         self.friction = np.array(friction, float)
         self.lining = lining
         self.impulse = np.zeros((len(node), 5))
@@ -330,6 +331,11 @@ class Solver:
         self.normal = self._normal_open
         self.active = self._active_open
         self.gate_open = True
+
+    def close_gate(self):
+        """Put the plug back: what is in the channel stays there, and nothing follows through the face."""
+        self.normal, self.active = self._closed
+        self.gate_open = False
 
     def step(self, dt_max=math.inf):
         """Advance by one time step, not longer than dt_max [s]; returns (dt, name of its limit)."""
