@@ -29,7 +29,7 @@ def _boxes():
     for value in decades(1e-12, 1e1) + [0.0, 100.0]:
         yield case(f"k={value:.0e}", "hydraulic conductivity [m/s]", hydraulic_conductivity=value)
     for value in (0.0, 10.0, 30.0, 50.0, 59.0, 60.0):
-        yield case(f"phi={value:g}", "friction angle [degree], c = 5 kPa", friction_angle=value, cohesion=5e3)
+        yield case(f"phi={value:g}", "friction angle [degree], c = 0.5 kPa", friction_angle=value, cohesion=5e2)
     for value in (0.0, 1e3, 1e5, 1e6):
         yield case(f"c={value:g}", "cohesion [Pa]", cohesion=value)
     for value in (5.0, 15.0, 25.0, 30.0):
@@ -93,7 +93,7 @@ def _tunnels():
         yield case(f"gate at {angle:g}", "angle of the gate [degree]", angle=angle)
     yield case("sink", "material taken out behind the gate", interior="sink")
     yield case("full", "tunnel filled to the crown, gate open: rest", filled_tunnel, True)
-    yield case("filling", "a small tunnel until nothing more fits", gate, diameter=0.8, width=0.2, cover=3.0, seconds=3.0)
+    yield case("filling", "a small tunnel until nothing more fits", gate, diameter=1.0, width=0.2, cover=3.0, seconds=3.0)
     yield case("closed again", "gate open for 0.1 s, closed, 0.1 s", representative=True, close_at=0.1, seconds=0.2)
     yield case("reopened", "open, closed, open", close_at=0.05, reopen_at=0.1, seconds=0.2)
     yield case("ten times", "ten times the run", seconds=3.0)

@@ -103,7 +103,14 @@ def _message(error):
     details = getattr(error, "errors", None)
     if details is None:
         return str(error)
-    return "; ".join(d["msg"].removeprefix("Value error, ") for d in details())
+    found = details()
+    # a soil that is refused also leaves the list of soils empty: the second message is an echo
+    told = [d for d in found if d["type"] != "too_short"] or found
+    return "; ".join(f"{_place(d)}{d['msg'].removeprefix('Value error, ')}" for d in told)
+
+
+def _place(detail):
+    return "" if detail["type"] == "value_error" else f"{detail['loc'][-1]} = {detail['input']:g}: "
 
 
 def follow(monitor, seconds, most_steps=200_000, events=()):
