@@ -165,6 +165,32 @@ def bench_command(
             Console().print(table)
 
 
+@app.command("stability")
+def stability_command(
+    case: Annotated[list[str] | None, typer.Argument(help="Extremes to run; * for any ending; all if none.")] = None,
+    linear: Annotated[bool, typer.Option("--linear", help="Only the linear analysis of the time step.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Folder for the page, its data and the map.")] = None,
+    json_path: JsonPath = None,
+):
+    """Critical time step, predicted against exact, and runs at the edge of what a scene can ask for.
+
+    JSON: keys of `coupling.stability.command.stability`. Exit code 3 when one of its `faults` is found.
+    """
+    with _failures(), _checked_json(json_path):
+        from coupling.stability.command import stability, tables
+
+        data = stability(case or [], linear, out, Console(stderr=True).print)
+        _write_json(json_path, data)
+        if str(json_path) != "-":
+            console = Console()
+            for table in tables(data):
+                console.print(table)
+            for path in data["files"]:
+                console.print(path, highlight=False, soft_wrap=True)
+    if data["faults"]:
+        _complain("\n".join(data["faults"]), FAILED)
+
+
 def main():
     """Entry point of the command `gush`."""
     app()

@@ -38,6 +38,9 @@ def in_unit(unit: str) -> BeforeValidator:
     return BeforeValidator(convert)
 
 
+# Dilatancy over friction angle up to which mean volume changes create no energy: measured, docs/stability.md.
+MOST_DILATANCY = 0.2
+
 Length = Annotated[float, in_unit("m")]
 Pressure = Annotated[float, in_unit("Pa")]
 Density = Annotated[float, in_unit("kg/m**3")]
@@ -253,6 +256,13 @@ class Scene(Part):
                 raise ValueError(
                     f"soil '{unknown[0]}': hydraulic_conductivity must be given where there is water, got none; give "
                     "the Darcy conductivity in m/s, sand about 1e-4, or leave [water] out for a dry scene"
+                )
+        for soil in self.soils if self.numerics.volumetric_smoothing else ():
+            if soil.model == "mohr-coulomb" and soil.dilatancy_angle > MOST_DILATANCY * soil.friction_angle:
+                raise ValueError(
+                    f"soil '{soil.name}': dilatancy_angle must be at most a fifth of friction_angle "
+                    f"({MOST_DILATANCY * soil.friction_angle:g} deg), got {soil.dilatancy_angle:g} deg; with mean "
+                    "volume changes more of it creates energy; lower it or set numerics.volumetric_smoothing = false"
                 )
         if self.water is not None and self.water.table_depth >= self.box.depth:
             raise ValueError(

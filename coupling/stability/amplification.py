@@ -9,14 +9,14 @@ measures how invariant it was.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from coupling.verification.boxes import box_mesh
 from mpm.scene import Scene
 from mpm.solver import Solver
-from mpm.variables import MASS, SXX, SXY, SYY, V_P, VLX, VLY, VSX, VSY, N, P, X, Y
+from mpm.variables import SXX, SXY, SYY, V_P, VLX, VLY, VSX, VSY, P, X, Y
 
 STABLE = 1e-4  # excess of the spectral radius over 1: beyond the limit it is some 0.1 one per cent further
 SMALL = 1e-6  # speed of a perturbation over the wave speed: what it moves is nothing beside an element
@@ -269,9 +269,3 @@ def _placed(solver, column):
     corners = solver.mesh.nodes[solver.mesh.elements[solver.element_of_point]]
     return np.einsum("pk,pkd->pd", weight, corners)
 
-
-def measure(column):
-    """Predicted and actual critical time step of a column, as a dict of floats."""
-    a = Amplification(column)
-    actual = a.critical_time_step()
-    return {"predicted": a.predicted, "actual": actual, "leak": a.leak}

@@ -19,7 +19,7 @@ def cases():
 
 def _boxes():
     """Material numbers, on the collapse of a block in a closed box."""
-    chosen = {"K_w=1e+11", "k=1e-12", "k=1e+01", "E=1e+05", "n=0.0501", "dry"}
+    chosen = {"K_w=2.2e+09", "k=1e-12", "k=1e+01", "E=1e+05", "n=0.0501", "phi=50,psi=50", "dry"}
 
     def case(name, title, **settings):
         return Case(name, title, collapse, settings, name in chosen)
@@ -32,9 +32,13 @@ def _boxes():
         yield case(f"phi={value:g}", "friction angle [degree], c = 0.5 kPa", friction_angle=value, cohesion=5e2)
     for value in (0.0, 1e3, 1e5, 1e6):
         yield case(f"c={value:g}", "cohesion [Pa]", cohesion=value)
-    for value in (5.0, 15.0, 25.0, 30.0):
+    for value in (2.0, 5.0, 15.0, 30.0):
         yield case(f"psi={value:g}", "dilatancy angle [degree], phi = 25", dilatancy_angle=value)
+    for value in (10.0, 25.0):
+        title = "the same, no volumetric smoothing"
+        yield case(f"psi={value:g},no smoothing", title, dilatancy_angle=value, volumetric_smoothing=False)
     yield case("phi=0,c=0", "no strength at all", friction_angle=0.0, cohesion=0.0)
+    yield case("phi=50,psi=10", "dilatant", friction_angle=50.0, dilatancy_angle=10.0)
     yield case("phi=50,psi=50", "associated flow at 50 degrees", friction_angle=50.0, dilatancy_angle=50.0)
     yield case("tension=1e5", "tensile strength beyond the apex", tensile_strength=1e5)
     for value in decades(1e5, 1e10) + [1e3]:
@@ -81,6 +85,7 @@ def _tunnels():
     yield case("E=1e5,gate", "mud", youngs_modulus=1e5)
     yield case("E=1e10,gate", "rock", youngs_modulus=1e10, seconds=0.05)
     yield case("c=1e6,gate", "cemented: nothing comes in", cohesion=1e6, model="mohr-coulomb")
+    yield case("phi=50,psi=10,gate", "dilatant", friction_angle=50.0, dilatancy_angle=10.0)
     yield case("phi=50,psi=50,gate", "associated", friction_angle=50.0, dilatancy_angle=50.0)
     yield case("dry,gate", "no water", water=False)
     yield case("no gravity,gate", "gravity 0", gravity=0.0)

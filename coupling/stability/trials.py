@@ -12,8 +12,7 @@ from mpm.scene import Scene
 from mpm.solver import Solver
 from mpm.variables import MASS, SXX, SXY, SYY, SZZ, V_P, VLX, VSX, N, P, X, Y
 
-REST = 0.05  # speed [m/s] of what should lie still, over that of free fall through an element
-DISCHARGE = 1.0  # most of the mixture comes in no faster than water falls freely from the surface
+REST = 0.01  # [m/s]: ground that has moved for a second at this speed has not moved by an element
 
 SOIL = {
     "name": "soil", "top_depth": 0.0, "model": "mohr-coulomb", "youngs_modulus": 4e7, "poissons_ratio": 0.3,
@@ -160,7 +159,7 @@ def filled_tunnel(seconds=0.3, **settings):
     """Soil everywhere, inside the tunnel too, with isotropic stress of level ground: the open gate changes nothing."""
     scene = coarse_tunnel(k0=1.0, **settings)  # any other stress slips along the lining's friction
     mesh = build_mesh(scene)
-    mesh.region[:] = 0
+    mesh.region[mesh.nodes[mesh.elements].mean(axis=1)[:, 1] < 0.0] = 0  # all but what lies above the ground
     solver = Solver(scene, mesh, threads=1)
     solver.open_gate()
     monitor = Monitor(solver)
@@ -168,9 +167,11 @@ def filled_tunnel(seconds=0.3, **settings):
     moved = measures["inflow_mass"] / monitor.inflow[0]
     if abs(moved) > 1e-3:
         faults.append(f"{moved:.2%} of the content came in through the gate of a full tunnel")
-    if monitor.most_speed > 0.1:
-        faults.append(f"ground at rest moves at {monitor.most_speed:.2g} m/s")
-    return faults, measures
+    # the wall bears the corners of the gate in one direction only, so they give way at first
+    last = math.sqrt(2 * monitor.kinetic / float(np.sum(solver.points[:, MASS])))
+    if last > REST:
+        faults.append(f"does not come to rest: {last:.2g} m/s")
+    return faults, measures | {"last_speed": last}
 
 
 def _inflow_faults(monitor, close_at, reopen_at):
