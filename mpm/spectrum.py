@@ -19,7 +19,7 @@ from mpm.variables import MASS, S_DRAG, S_G, S_LAMBDA, S_RHO_S, N, X, Y
 
 SAFETY = 0.9  # Ritz values come from below, and points move until the next estimate
 TOLERANCE = 1e-2  # of the largest eigenvalue
-ROUNDS = 3  # of the step that the drag depends on, from below
+ROUNDS = 3  # of the step that the drag depends on, from below, at the first call
 
 
 class Spectrum:
@@ -138,9 +138,9 @@ def spectral_time_step(solver, shortest, start=None):
     ----------
     solver : mpm.solver.Solver
     shortest : float
-        A time step that is certainly not above the critical one [s].
+        A time step that is certainly not above the critical one [s]; the nearer, the sharper the drag.
     start : (k,) float64 or None
-        Mode of an earlier call.
+        Mode of an earlier call, whose step `shortest` then comes from: one round will do.
 
     Returns
     -------
@@ -149,7 +149,7 @@ def spectral_time_step(solver, shortest, start=None):
     mode : (k,) float64 or None
     """
     spectrum, dt = Spectrum(solver), shortest
-    for _ in range(ROUNDS if spectrum.wet else 1):
+    for _ in range(ROUNDS if spectrum.wet and start is None else 1):
         value, start = spectrum.largest(dt, start)
         if not 0 < value < math.inf:
             return shortest, None

@@ -16,9 +16,11 @@ import numpy as np
 from coupling.verification.boxes import box_mesh
 from mpm.scene import Scene
 from mpm.solver import Solver
+from mpm.spectrum import spectral_time_step
 from mpm.variables import SXX, SXY, SYY, V_P, VLX, VLY, VSX, VSY, P, X, Y
 
 STABLE = 1e-4  # excess of the spectral radius over 1: beyond the limit it is some 0.1 one per cent further
+SCANNED = (0.1, 0.3, 0.5, 0.7, 0.85, 1.0, 1.1, 1.2, 1.4, 2.0, 4.0)  # steps looked at, over the spectral one
 SMALL = 1e-6  # speed of a perturbation over the wave speed: what it moves is nothing beside an element
 
 
@@ -114,7 +116,7 @@ class SteppedAt(Solver):
     def step_of(self, dt):
         """Map the points as they are and advance by dt [s], whatever the critical time step."""
         self.map_points()
-        self._limits = [(dt, 0.0)]
+        self._limits, self._longest_step = [(dt, 0.0)], math.inf
         return self.step(dt)
 
 
@@ -127,8 +129,8 @@ class Amplification:
 
     Attributes
     ----------
-    predicted : float
-        Critical time step [s] by the program's formula: its time step at Courant number 1.
+    altitude, spectral : float
+        Critical time step [s] by the program's two ways: its time step at Courant number 1.
     leak : float
         Largest share of a step's result that left the space of the matrix: round-off.
     """
@@ -145,7 +147,8 @@ class Amplification:
         stress = speed * solver.wave_speed * 2000.0
         solver.points[:, P] = 10 * stress if self._wet else 0.0  # positive, whatever is added
         solver.nodes[:, V_P] = solver.points[:, P].max()
-        self.predicted = solver.time_step_estimate()[0]
+        self.altitude = solver.time_step_estimate()[0]
+        self.spectral, _ = spectral_time_step(solver, 0.5 * self.altitude)
         self._start = _copied(solver)
         self._spaces = self._bases(speed, stress)
         self.leak = 0.0
@@ -174,34 +177,41 @@ class Amplification:
                     self.leak = max(self.leak, float(np.linalg.norm(c - b @ (b.T @ c)) / max(np.linalg.norm(c), 1e-3)))
         return np.stack(columns, axis=1)
 
+    def step(self, state, dt):
+        """State after one step of the solver itself from the rest state plus `state`: (size,) float64."""
+        self._set({})
+        self.solver.step_of(dt)
+        rest = self._get()
+        parts = np.split(state, np.cumsum([basis.shape[1] for _, _, basis, _ in self._spaces])[:-1])
+        self._set({k: s * b @ part for k, ((_, _, b, s), part) in enumerate(zip(self._spaces, parts, strict=True))})
+        self.solver.step_of(dt)
+        change = zip(self._get(), rest, self._spaces, strict=True)
+        return np.concatenate([b.T @ ((now - then) / s) for now, then, (_, _, b, s) in change])
+
     def spectral_radius(self, dt):
         """Largest modulus of the eigenvalues at time step dt [s]."""
         return float(np.abs(np.linalg.eigvals(self.matrix(dt))).max())
 
-    def critical_time_step(self, courants=(0.25, 0.5, 0.75, 1.0), most=8.0, accuracy=0.01):
+    def critical_time_step(self, accuracy=0.005):
         """Largest time step [s] up to which no mode grows: the first crossing above the steps scanned, bisected.
 
-        courants : steps over the predicted one that are looked at first;  most : where the search ends, over the
-        predicted step;  accuracy : of the bisection, relative.
+        accuracy : of the bisection, relative. Infinite where nothing grows up to `SCANNED[-1]` times the spectral step.
         """
-        low, high = 0.0, None
-        scan = [*courants]
-        while scan[-1] < most:
-            scan.append(scan[-1] * 1.25)
-        for courant in scan:
-            if self.spectral_radius(courant * self.predicted) > 1 + STABLE:
+        low = 0.0
+        for courant in SCANNED:
+            if self.spectral_radius(courant * self.spectral) > 1 + STABLE:
                 high = courant
                 break
             low = courant
-        if high is None:
+        else:
             return math.inf
         while high - low > accuracy * high:
             middle = 0.5 * (low + high)
-            if self.spectral_radius(middle * self.predicted) > 1 + STABLE:
+            if self.spectral_radius(middle * self.spectral) > 1 + STABLE:
                 high = middle
             else:
                 low = middle
-        return low * self.predicted
+        return low * self.spectral
 
     def _bases(self, speed, stress):
         """Invariant space: (array of the solver, column, orthonormal basis, scale) a field."""

@@ -12,9 +12,10 @@ POSITIONS = (
     *(("layout", points, 0) for points in (1, 3, 4, 6, 12, 25)),
     *((place, points, seed) for place in ("random", "edges", "vertices") for points in (1, 3, 12) for seed in (0, 1)),
 )
+WAYS = ("altitude", "spectral")
 UNITS = {
     "bulk_modulus": "Pa", "hydraulic_conductivity": "m s-1", "youngs_modulus": "Pa", "size": "m", "pic_rate": "s-1",
-    "predicted": "s", "actual": "s",
+    "altitude": "s", "spectral": "s", "actual": "s",
 }  # fmt: skip
 
 
@@ -46,13 +47,14 @@ def columns():
 
 
 def measure(column):
-    """Predicted and actual critical time step [s], excess of the spectral radius below both, leak of the matrix."""
+    """Both predicted and the actual critical time step [s], excess of the spectral radius at half of it, leak."""
     amplification = Amplification(column)
     actual = amplification.critical_time_step()
     return {
-        "predicted": amplification.predicted,
+        "altitude": amplification.altitude,
+        "spectral": amplification.spectral,
         "actual": actual,
-        "excess": amplification.spectral_radius(0.5 * min(actual, amplification.predicted)) - 1.0,
+        "excess": amplification.spectral_radius(0.5 * actual) - 1.0,
         "leak": amplification.leak,
     }
 
@@ -70,8 +72,9 @@ def critical_map(chosen=None, progress=None):
     Returns
     -------
     xarray.Dataset
-        Dimension configuration; the fields of `Column`, family, predicted [s], actual [s], ratio = predicted / actual,
-        excess of the spectral radius over 1 at half the critical step, leak [-].
+        Dimension configuration; the fields of `Column`; family; altitude, spectral (predicted critical steps) and
+        actual [s]; altitude_ratio, spectral_ratio: predicted / actual; excess of the spectral radius over 1 at half
+        the actual step; leak [-].
     """
     import xarray as xr
 
@@ -80,10 +83,10 @@ def critical_map(chosen=None, progress=None):
     for number, (family, column) in enumerate(chosen):
         row = {"family": family, **asdict(column), **measure(column)}
         row["bulk_modulus"] = np.nan if column.bulk_modulus is None else column.bulk_modulus
-        rows.append(row | {"ratio": row["predicted"] / row["actual"]})
+        rows.append(row | {f"{way}_ratio": row[way] / row["actual"] for way in WAYS})
         if progress is not None:
             progress(number + 1, len(chosen))
-    names = ["family", *(f.name for f in fields(Column)), "predicted", "actual", "ratio", "excess", "leak"]
+    names = ["family", *(f.name for f in fields(Column)), *WAYS, "actual", *(f"{way}_ratio" for way in WAYS), "excess", "leak"]
     data = {
         name: ("configuration", np.array([row[name] for row in rows]), {"units": UNITS.get(name, "1")})
         for name in names
