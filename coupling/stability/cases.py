@@ -19,7 +19,7 @@ def cases():
 
 def _boxes():
     """Material numbers, on the collapse of a block in a closed box."""
-    chosen = {"K_w=2.2e+09", "k=1e-12", "k=1e+01", "E=1e+05", "n=0.0501", "phi=50,psi=50", "dry"}
+    chosen = {"K_w=2.2e+09", "k=1e-12", "k=1e+01", "E=1e+05", "phi=50,psi=50", "dry"}
 
     def case(name, title, **settings):
         return Case(name, title, collapse, settings, name in chosen)
@@ -98,7 +98,9 @@ def _tunnels():
         yield case(f"gate at {angle:g}", "angle of the gate [degree]", angle=angle)
     yield case("sink", "material taken out behind the gate", interior="sink")
     yield case("full", "tunnel filled to the crown, gate open: rest", filled_tunnel, True)
-    yield case("filling", "a small tunnel until nothing more fits", gate, diameter=1.0, width=0.2, cover=3.0, seconds=3.0)
+    yield case(
+        "filling", "a small tunnel until nothing more fits", gate, diameter=1.0, width=0.2, cover=3.0, seconds=3.0
+    )
     yield case("closed again", "gate open for 0.1 s, closed, 0.1 s", representative=True, close_at=0.1, seconds=0.2)
     yield case("reopened", "open, closed, open", close_at=0.05, reopen_at=0.1, seconds=0.2)
     yield case("ten times", "ten times the run", seconds=3.0)

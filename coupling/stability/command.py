@@ -4,7 +4,7 @@ from coupling.scene import SceneError
 from coupling.stability.cases import cases
 from coupling.stability.extremes import BUG, judge_apart
 from coupling.stability.linear import critical_map
-from coupling.stability.report import summary, write
+from coupling.stability.report import ALLOWED, summary, write
 
 
 class CaseUnknown(SceneError):
@@ -41,9 +41,9 @@ def stability(names, linear, out, tell):
     data = summary(found, verdicts)
     faults = [f"{v.name}: {v.reason}" for v in verdicts if v.verdict == BUG]
     faults += [
-        f"{row['family']}: predicted critical step above the actual one, {row['ratio_max']:.2f} of it"
+        f"{row['family']}: spectral step is {row['spectral_min']:.2f} .. {row['spectral_max']:.2f} of the critical one"
         for row in data["linear"] or []
-        if row["ratio_max"] > 1.0
+        if row["spectral_max"] > ALLOWED[1] or row["spectral_min"] < ALLOWED[0]
     ]
     return data | {"files": [] if out is None else [str(p) for p in write(out, found, verdicts)], "faults": faults}
 
@@ -66,9 +66,9 @@ def tables(data):
 
     made = []
     if data["linear"]:
-        table = Table("family", "configurations", "least", "median", "most", title="predicted / actual critical step")
+        table = Table("family", "columns", "spectral", "altitude", title="predicted / actual critical step")
         for row in data["linear"]:
-            ratios = (f"{row[f'ratio_{k}']:.2f}" for k in ("min", "median", "max"))
+            ratios = (f"{row[f'{way}_min']:.2f} .. {row[f'{way}_max']:.2f}" for way in ("spectral", "altitude"))
             table.add_row(row["family"], str(row["configurations"]), *ratios)
         made.append(table)
     if data["extremes"]:

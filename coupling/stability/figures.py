@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 from coupling.figures import GATE, NOW, SECOND, STYLE
 
 PLACES = ("layout", "random", "edges", "vertices")
+SETS = (("spectral", 1, NOW), ("spectral", 0, "0.45"), ("altitude", 1, SECOND), ("altitude", 0, GATE))
 
 
 def critical_courant(linear):
@@ -18,16 +19,19 @@ def critical_courant(linear):
         Of :func:`coupling.stability.linear.critical_map`.
     """
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.4, 6.0), layout="constrained")
-        axes = figure.subplots(2, 2)
-        moduli = _family(linear, "moduli")
+        figure = Figure(figsize=(7.4, 7.6), layout="constrained")
+        axes = figure.subplots(3, 2)
+        moduli, permeability = _family(linear, "moduli"), _family(linear, "permeability")
         moduli = moduli.isel(configuration=np.isfinite(moduli.bulk_modulus.values))
-        image = _heat(axes[0, 0], moduli, "youngs_modulus", "bulk_modulus", "Young's modulus [Pa]", "water's bulk modulus [Pa]")
-        _heat(axes[0, 1], _family(linear, "permeability"), "hydraulic_conductivity", "size",
-              "hydraulic conductivity [m/s]", "cell [m]")  # fmt: skip
-        figure.colorbar(image, ax=axes[0], label="predicted / actual critical step [-]")
-        _positions(axes[1, 0], _family(linear, "positions"))
-        _shapes(axes[1, 1], _family(linear, "mesh"))
+        for column, way in enumerate(("spectral", "altitude")):
+            _heat(axes[0, column], moduli, way, "youngs_modulus", "bulk_modulus",
+                  "Young's modulus [Pa]", "bulk modulus of the water [Pa]")  # fmt: skip
+            image = _heat(axes[1, column], permeability, way, "hydraulic_conductivity", "size",
+                          "hydraulic conductivity [m/s]", "height of a cell [m]")  # fmt: skip
+            axes[0, column].set_title(way)
+        figure.colorbar(image, ax=axes[:2], label="predicted / actual critical step [-]", shrink=0.6)
+        _positions(axes[2, 0], _family(linear, "positions"))
+        _shapes(axes[2, 1], _family(linear, "mesh"))
     return figure
 
 
@@ -35,10 +39,10 @@ def _family(linear, name):
     return linear.isel(configuration=(linear.family == name).values)
 
 
-def _heat(axis, part, x, y, x_label, y_label):
+def _heat(axis, part, way, x, y, x_label, y_label):
     xs, ys = np.unique(part[x]), np.unique(part[y])
     values = np.full((len(ys), len(xs)), np.nan)
-    values[np.searchsorted(ys, part[y]), np.searchsorted(xs, part[x])] = part.ratio
+    values[np.searchsorted(ys, part[y]), np.searchsorted(xs, part[x])] = part[f"{way}_ratio"]
     image = axis.imshow(values, origin="lower", aspect="auto", vmin=0.0, vmax=1.0, cmap="viridis")
     axis.set_xticks(range(len(xs)), [f"{v:.0e}" for v in xs], rotation=60)
     axis.set_yticks(range(len(ys)), [f"{v:.1e}" for v in ys])
@@ -51,40 +55,37 @@ def _heat(axis, part, x, y, x_label, y_label):
 
 def _positions(axis, part):
     rng = np.random.default_rng(0)
-    for offset, (wet, smooth) in enumerate(((True, 1), (True, 0), (False, 1), (False, 0))):
-        chosen = part.isel(
-            configuration=((np.isfinite(part.bulk_modulus) == wet) & (part.volumetric_smoothing == smooth)).values
+    for offset, (way, smooth, colour) in enumerate(SETS):
+        chosen = part.isel(configuration=(part.volumetric_smoothing == smooth).values)
+        at = np.array([PLACES.index(p) for p in chosen.positions.values]) + 0.2 * (offset - 1.5)
+        at = at + rng.uniform(-0.06, 0.06, len(at))
+        axis.plot(
+            at, chosen[f"{way}_ratio"], ".", ms=4, color=colour, label=f"{way}{'' if smooth else ', no smoothing'}"
         )
-        at = np.array([PLACES.index(p) for p in chosen.positions.values]) + 0.18 * (offset - 1.5)
-        label = f"{'water' if wet else 'dry'}, {'smoothed' if smooth else 'not smoothed'}"
-        colour = (NOW, SECOND, "0.45", GATE)[offset]
-        axis.plot(at + rng.uniform(-0.05, 0.05, len(at)), chosen.ratio, ".", color=colour, label=label)
     _limits(axis)
     axis.set_xticks(range(len(PLACES)), PLACES)
     axis.set_xlabel("positions of the points")
-    axis.legend(loc="upper left")
 
 
 def _shapes(axis, part):
-    for place, colour in (("layout", NOW), ("vertices", GATE)):
-        for smooth, marker in ((1, "o"), (0, "^")):
-            chosen = part.isel(
-                configuration=((part.positions == place) & (part.volumetric_smoothing == smooth)).values
-            )
-            shift = 1.0 + 0.12 * (chosen["skew"] > 0)
-            axis.plot(chosen.aspect * shift, chosen.ratio, marker, ms=4, color=colour, mfc="none",
-                      label=f"{place}, {'smoothed' if smooth else 'not smoothed'}")  # fmt: skip
+    for way, smooth, colour in SETS:
+        for place, marker in (("layout", "o"), ("vertices", "^")):
+            chosen = part.isel(configuration=((part.positions == place) & (part.volumetric_smoothing == smooth)).values)
+            at = np.array([0.3, 1.0, 3.0]).searchsorted(chosen.aspect) + 0.2 * (chosen["skew"] > 0)
+            axis.plot(at, chosen[f"{way}_ratio"], marker, ms=4, color=colour, mfc="none")
+    for way, smooth, colour in SETS:
+        axis.plot([], [], "s", ms=4, color=colour, label=f"{way}{'' if smooth else ', no smoothing'}")
+    for place, marker in (("layout", "o"), ("vertices", "^")):
+        axis.plot([], [], marker, ms=4, color="0.3", mfc="none", label=f"points: {place}")
     _limits(axis)
-    axis.set_xscale("log")
-    axis.set_xticks([0.3, 1.0, 3.0], ["0.3", "1", "3"])
-    axis.minorticks_off()
-    axis.set_xlabel("width over height of a cell; right of each: inner nodes shifted by up to a fifth")
-    axis.legend(loc="upper left")
+    axis.set_xticks([0, 0.2, 1, 1.2, 2, 2.2], ["0.3", "skew", "1", "skew", "3", "skew"])
+    axis.set_xlabel("width over height of a cell; skew: inner nodes shifted by up to a fifth")
+    axis.legend(loc="upper left", fontsize=6, ncols=2)
 
 
 def _limits(axis):
     axis.axhline(1.0, color="0.3", lw=0.8)
     axis.axhline(0.7, color="0.3", lw=0.8, ls="--")
-    axis.set_ylim(bottom=0.0)
+    axis.set_ylim(0.0, 2.1)
     axis.set_ylabel("predicted / actual critical step [-]")
     axis.grid(True)

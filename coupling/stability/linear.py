@@ -29,12 +29,19 @@ def columns():
         (0.06, 0.2, 0.45, 0.7, 0.89), (8e7, 2.2e9), (1e-8, 1e-4, 1.0)
     ):
         for stiffness in (4e7, 1e10):
-            yield "porosity", Column(
-                porosity=porosity, bulk_modulus=modulus, hydraulic_conductivity=conductivity, youngs_modulus=stiffness
+            yield (
+                "porosity",
+                Column(
+                    porosity=porosity,
+                    bulk_modulus=modulus,
+                    hydraulic_conductivity=conductivity,
+                    youngs_modulus=stiffness,
+                ),
             )
     for (place, points, seed), modulus, smoothing in itertools.product(POSITIONS, (None, 8e7), (True, False)):
-        yield "positions", Column(
-            positions=place, points=points, seed=seed, bulk_modulus=modulus, volumetric_smoothing=smoothing
+        yield (
+            "positions",
+            Column(positions=place, points=points, seed=seed, bulk_modulus=modulus, volumetric_smoothing=smoothing),
         )
     shapes = [(aspect, skew, seed) for aspect in (0.3, 1.0, 3.0) for skew, seed in ((0.0, 0), (0.2, 0), (0.2, 1))]
     for (aspect, skew, seed), place, smoothing in itertools.product(shapes, ("layout", "vertices"), (True, False)):
@@ -86,7 +93,15 @@ def critical_map(chosen=None, progress=None):
         rows.append(row | {f"{way}_ratio": row[way] / row["actual"] for way in WAYS})
         if progress is not None:
             progress(number + 1, len(chosen))
-    names = ["family", *(f.name for f in fields(Column)), *WAYS, "actual", *(f"{way}_ratio" for way in WAYS), "excess", "leak"]
+    names = [
+        "family",
+        *(f.name for f in fields(Column)),
+        *WAYS,
+        "actual",
+        *(f"{way}_ratio" for way in WAYS),
+        "excess",
+        "leak",
+    ]
     data = {
         name: ("configuration", np.array([row[name] for row in rows]), {"units": UNITS.get(name, "1")})
         for name in names
@@ -95,5 +110,7 @@ def critical_map(chosen=None, progress=None):
     data["volumetric_smoothing"] = (data["volumetric_smoothing"][0], data["volumetric_smoothing"][1].astype(np.int8))
     for name in ("family", "positions"):
         data[name] = ("configuration", np.array([row[name] for row in rows], dtype=object))
-    text = "critical time step of a column of the solver: predicted by the program, and exact by its amplification matrix"
+    text = (
+        "critical time step of a column of the solver: predicted by the program, and exact by its amplification matrix"
+    )
     return xr.Dataset(data, attrs={"title": text})

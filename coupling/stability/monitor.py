@@ -10,8 +10,8 @@ from mpm.variables import (
     MASS,
     POROSITY_CEILING,
     POROSITY_FLOOR,
-    S_LAMBDA,
     S_G,
+    S_LAMBDA,
     SXX,
     SXY,
     SYY,
@@ -102,7 +102,9 @@ class Monitor:
         if not np.isfinite(state).all():
             faults.append("a point is not finite")
         if self.created > ENERGY_SLACK * self.in_play:
-            faults.append(f"energy from nothing: {self.created:.3g} J/m, {self.created / self.in_play:.0%} of what moves")
+            faults.append(
+                f"energy from nothing: {self.created:.3g} J/m, {self.created / self.in_play:.0%} of what moves"
+            )
         if self.mass_error > MASS_ERROR:
             faults.append(f"grain mass at the nodes is wrong by {self.mass_error:.1e}")
         if self.most_stress > self.stress_bound:
@@ -133,9 +135,7 @@ class Monitor:
             "stress_bound": self.stress_bound,
             "most_speed": self.most_speed,
             "inflow_mass": self.inflow[-1] - self.inflow[0],
-            **{
-                f"clamped_{name}": float(count) for name, count in zip(CLAMPS, solver.clamps.sum(axis=0), strict=True)
-            },
+            **{f"clamped_{name}": float(count) for name, count in zip(CLAMPS, solver.clamps.sum(axis=0), strict=True)},
         }
 
 
