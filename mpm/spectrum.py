@@ -9,8 +9,8 @@ The stiffness holds what the kernels hold: mean volume changes, element strains,
 nodes, twice, with the points between (velocities return to the nodes through them, MUSL), which takes the shortest
 waves of consistent-mass kind away. Altitude over wave speed knows none of this.
 
-With a share s of PIC velocities are multiplied by g = 1 - s + s f in a step, where 0 <= f <= 1 is what the way through the
-points leaves of the mode; then dt^2 k = 2 (1 + g) m, and dt sqrt(1 - s/2) is not above any of these.
+With a share s of PIC velocities are multiplied by g = 1 - s + s f in a step, where 0 <= f <= 1 is what the way
+through the points leaves of the mode; then dt^2 k = 2 (1 + g) m, and dt sqrt(1 - s/2) is not above any of these.
 """
 
 import math

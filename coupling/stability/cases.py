@@ -26,7 +26,7 @@ def _boxes():
 
     for value in (1e6, 8e7, 2.2e9, 1e10, 1e11, 1e12):
         yield case(f"K_w={value:.2g}", "bulk modulus of the water [Pa]", bulk_modulus=value)
-    for value in decades(1e-12, 1e1) + [0.0, 100.0]:
+    for value in [*decades(1e-12, 1e1), 0.0, 100.0]:
         yield case(f"k={value:.0e}", "hydraulic conductivity [m/s]", hydraulic_conductivity=value)
     for value in (0.0, 10.0, 30.0, 50.0, 59.0, 60.0):
         yield case(f"phi={value:g}", "friction angle [degree], c = 0.5 kPa", friction_angle=value, cohesion=5e2)
@@ -41,7 +41,7 @@ def _boxes():
     yield case("phi=50,psi=10", "dilatant", friction_angle=50.0, dilatancy_angle=10.0)
     yield case("phi=50,psi=50", "associated flow at 50 degrees", friction_angle=50.0, dilatancy_angle=50.0)
     yield case("tension=1e5", "tensile strength beyond the apex", tensile_strength=1e5)
-    for value in decades(1e5, 1e10) + [1e3]:
+    for value in [*decades(1e5, 1e10), 1e3]:
         yield case(f"E={value:.0e}", "Young's modulus [Pa]", youngs_modulus=value)
     for value in (0.0, 0.45, 0.49, 0.499, 0.5):
         yield case(f"nu={value:g}", "Poisson's ratio [-]", poissons_ratio=value)

@@ -153,7 +153,7 @@ def kinetic_energy(solver):
 
 
 def strain_energy(solver):
-    """Stored in the skeleton's and the water's elasticity [J/m]: 1/2 sigma : C^-1 : sigma + p^2 n / (2 K_w), per volume."""
+    """Stored in skeleton and water [J/m]: 1/2 sigma : C^-1 : sigma + p^2 n / (2 K_w), times the volume."""
     inside = solver.element_of_point >= 0
     p, volume = solver.points[inside], solver._volumes()[inside]
     shear, lam = (solver.soils[solver.soil_of_point[inside], k] for k in (S_G, S_LAMBDA))
@@ -166,6 +166,6 @@ def strain_energy(solver):
 
 
 def largest_stress(solver):
-    """Largest effective stress or positive pore pressure of the points in the mesh [Pa]; a negative one carries nothing."""
+    """Largest effective stress or pore pressure of the points in the mesh [Pa]; a negative pressure carries nothing."""
     p = solver.points[solver.element_of_point >= 0]
     return float(max(np.abs(p[:, [SXX, SYY, SZZ, SXY]]).max(initial=0.0), p[:, P].max(initial=0.0)))

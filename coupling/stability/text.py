@@ -15,29 +15,20 @@ matrix is formed, which is round-off.
 """
 
 READING = """
-What the map says:
-
-- The spectral prediction is never above the actual critical step and never below 0.7 of it.
-- The altitude's is neither. On the program's own layouts it is some 0.4 of the actual one, so the default Courant
-  number of 0.5 runs at a fifth of what is stable. It does not see that velocities return to the nodes through the
-  points, which takes the shortest waves away (in one dimension with a consistent mass: a factor of sqrt(8/3) = 1.63),
-  that mean volume changes soften them, that drag locks the water to the grains, nor that a flat element has stiffer
-  neighbours.
-- With points gathered at vertices, flat elements and no volumetric smoothing the altitude's prediction is *above* the
-  actual step, by up to the factor in the table: Courant number 1 would blow up there. At the default of 0.5 all
-  columns are stable. No factor on the altitude can stay below the actual step everywhere and within 0.7 of it: the
-  ratio varies with the points' positions and the shape of the elements by more than 1/0.7.
-- The default stays "altitude": every published number of this program was made with it. On the scene `quick` to 50
-  kg/m "spectral" took half the steps and reached that mass 1.2 % earlier.
-- Growth: one point per element, all points within 1e-4 of a vertex, smoothing and pressure filter both on, gives a
-  mode that grows by 0.2 % a step at half the altitude's step, far below the actual critical step, which counts from 1
-  % a step on. Without the filter, without smoothing, with three points per element, or at k = 1e-2 m/s it is gone. It
-  is a weak instability of the filter that the critical step says nothing about.
-- With PIC the critical step is up to sqrt(2) smaller than with FLIP; the spectral prediction counts it, the
-  altitude's does not.
-- Between two estimates (100 steps) points move; the estimate does not follow them. The margin is the Courant number.
-- Actual and predicted critical steps hold for resting, elastic states. Plastic flow softens. What is loose counts as
-  stiff and what is slack as pressed, so that closing up cannot make the step too long.
+- Why the altitude is so far off: velocities return to the nodes through the points, which takes the shortest waves
+  away (in one dimension with a consistent mass: a factor of sqrt(8/3) = 1.63 in the step); mean volume changes soften
+  them; drag locks the water to the grains; and a flat element has neighbours that are not. Points gathered at
+  vertices, flat elements and no smoothing make it worse than the truth. No factor on the altitude can serve: its
+  ratio varies with positions and shapes by more than 1/0.7.
+- Weak growth comes from the pressure filter together with mean volume changes; without either it is gone (trial with
+  one point per element, all within 1e-4 of a vertex). The critical step says nothing about it: it counts from 1 % a
+  step on.
+- PIC makes the critical step up to sqrt(2) smaller than FLIP; the spectral prediction counts it, the altitude's does
+  not.
+- The default is "altitude": every published number of this program was made with it. Spectral estimates are renewed
+  every 100 steps; points move in between, and the margin for that is the Courant number.
+- Both hold for resting, elastic states. Plastic flow softens. For the spectral step what is loose counts as stiff and
+  what is slack as pressed, so that closing up cannot make it too long.
 """
 
 EXTREMES = """
@@ -58,6 +49,8 @@ steps:
 
 FOUND = """
 ## What was found
+
+Numbers of this list are of trials made while this command was written; the table above is of today.
 
 - **Energy from nothing.** With mean volume changes (`volumetric_smoothing`) a dilatant Mohr-Coulomb soil gained
   energy without limit: a block of dry sand (phi = psi = 25 degrees) threw itself 0.2 m up, with 1600 J/m of kinetic
