@@ -71,16 +71,16 @@ def _shapes(axis, part):
     for way, smooth, colour in SETS:
         for place, marker in (("layout", "o"), ("vertices", "^")):
             chosen = part.isel(configuration=((part.positions == place) & (part.volumetric_smoothing == smooth)).values)
-            at = np.array([0.3, 1.0, 3.0]).searchsorted(chosen.aspect) + 0.2 * (chosen["skew"] > 0)
+            at = np.array([0.3, 1.0, 3.0]).searchsorted(chosen.aspect) + 0.3 * (chosen["skew"] > 0)
             axis.plot(at, chosen[f"{way}_ratio"], marker, ms=4, color=colour, mfc="none")
     for way, smooth, colour in SETS:
         axis.plot([], [], "s", ms=4, color=colour, label=f"{way}{'' if smooth else ', no smoothing'}")
     for place, marker in (("layout", "o"), ("vertices", "^")):
         axis.plot([], [], marker, ms=4, color="0.3", mfc="none", label=f"points: {place}")
     _limits(axis)
-    axis.set_xticks([0, 0.2, 1, 1.2, 2, 2.2], ["0.3", "skew", "1", "skew", "3", "skew"])
-    axis.set_xlabel("width over height of a cell; skew: inner nodes shifted by up to a fifth")
-    axis.legend(loc="upper left", fontsize=6, ncols=2)
+    axis.set_xticks([0, 0.3, 1, 1.3, 2, 2.3], ["0.3", "skew", "1", "skew", "3", "skew"])
+    axis.set_xlabel("width over height of a cell [-]; skew: nodes moved")
+    axis.legend(loc="upper left", fontsize=5, ncols=3, columnspacing=0.8, handletextpad=0.2)
 
 
 def _limits(axis):
