@@ -19,7 +19,7 @@ def critical_courant(linear):
         Of :func:`coupling.stability.linear.critical_map`.
     """
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.4, 7.6), layout="constrained")
+        figure = Figure(figsize=(8.4, 7.6), layout="constrained")
         axes = figure.subplots(3, 2)
         moduli, permeability = _family(linear, "moduli"), _family(linear, "permeability")
         moduli = moduli.isel(configuration=np.isfinite(moduli.bulk_modulus.values))
@@ -47,7 +47,15 @@ def _heat(axis, part, way, x, y, x_label, y_label):
     axis.set_xticks(range(len(xs)), [f"{v:.0e}" for v in xs], rotation=60)
     axis.set_yticks(range(len(ys)), [f"{v:.1e}" for v in ys])
     for (j, i), value in np.ndenumerate(values):
-        axis.text(i, j, f"{value:.2f}", ha="center", va="center", fontsize=5, color="white" if value < 0.6 else "black")
+        axis.text(
+            i,
+            j,
+            f"{value:.2f}",
+            ha="center",
+            va="center",
+            fontsize=5 if len(xs) < 9 else 4,
+            color="white" if value < 0.6 else "black",
+        )
     axis.set_xlabel(x_label)
     axis.set_ylabel(y_label)
     return image
@@ -80,7 +88,7 @@ def _shapes(axis, part):
     _limits(axis)
     axis.set_xticks([0, 0.3, 1, 1.3, 2, 2.3], ["0.3", "skew", "1", "skew", "3", "skew"])
     axis.set_xlabel("width over height of a cell [-]; skew: nodes moved")
-    axis.legend(loc="upper left", fontsize=5, ncols=3, columnspacing=0.8, handletextpad=0.2)
+    axis.legend(loc="upper left", fontsize=5, ncols=2, columnspacing=0.8, handletextpad=0.2)
 
 
 def _limits(axis):
