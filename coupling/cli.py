@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from coupling.exit_codes import JsonPath, checked_json, failures, write_json
-from coupling.measure_commands import accuracy_command, study_command
+from coupling.measure_commands import accuracy_command, stability_command, study_command
 from coupling.result_commands import export_command, info_command, report_command
 
 app = typer.Typer(
@@ -212,6 +212,7 @@ app.command("export")(export_command)
 app.command("info")(info_command)
 app.command("accuracy")(accuracy_command)
 app.command("study")(study_command)
+app.command("stability")(stability_command)
 
 
 def main():

@@ -23,12 +23,12 @@ def failures():
     try:
         yield
     except KeyboardInterrupt:
-        _complain("interrupted; what was computed stays readable", INTERRUPTED)
+        complain("interrupted; what was computed stays readable", INTERRUPTED)
     except (ValueError, RuntimeError, MemoryError, OSError) as error:
         code = _exit_code(error)
         if code is None:
             raise
-        _complain("\n".join([str(error) or "not enough memory", *getattr(error, "__notes__", ())]), code)
+        complain("\n".join([str(error) or "not enough memory", *getattr(error, "__notes__", ())]), code)
 
 
 def _exit_code(error):
@@ -76,6 +76,7 @@ def write_json(path, data):
         path.write_text(text, encoding="utf-8")
 
 
-def _complain(message, code):
+def complain(message, code):
+    """Print a message to standard error and leave with an exit code."""
     Console(stderr=True).print(message, style="red", markup=False, highlight=False, soft_wrap=True)
     raise typer.Exit(code)

@@ -1,4 +1,4 @@
-"""Commands of `gush` that measure the program or many scenes: accuracy, study."""
+"""Commands of `gush` that measure the program or many scenes: accuracy, stability, study."""
 
 from pathlib import Path
 from typing import Annotated
@@ -7,7 +7,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from coupling.exit_codes import JsonPath, checked_json, failures, write_json
+from coupling.exit_codes import FAILED, JsonPath, checked_json, complain, failures, write_json
 
 
 def accuracy_command(
@@ -40,6 +40,31 @@ def accuracy_command(
             console.print(f"page: {data['page']}", highlight=False, soft_wrap=True)
 
 
+def stability_command(
+    case: Annotated[list[str] | None, typer.Argument(help="Extremes to run; * for any ending; all if none.")] = None,
+    linear: Annotated[bool, typer.Option("--linear", help="Only the linear analysis of the time step.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Folder for the page, its data and the map.")] = None,
+    json_path: JsonPath = None,
+):
+    """Critical time step, predicted against exact, and runs at the edge of what a scene can ask for.
+
+    JSON: keys of `coupling.stability.command.stability`. Exit code 3 when one of its `faults` is found.
+    """
+    with failures(), checked_json(json_path):
+        from coupling.stability.command import stability, tables
+
+        data = stability(case or [], linear, out, Console(stderr=True).print)
+        write_json(json_path, data)
+        if str(json_path) != "-":
+            console = Console()
+            for table in tables(data):
+                console.print(table)
+            for path in data["files"]:
+                console.print(path, highlight=False, soft_wrap=True)
+    if data["faults"]:
+        complain("\n".join(data["faults"]), FAILED)
+
+
 def study_command(
     study: Annotated[
         str, typer.Argument(help="A built-in study (table-2, permeability, mesh, backend) or a TOML file.")
@@ -66,7 +91,7 @@ def study_command(
             console.print(_study_table(data))
             console.print(f"data: {data['data']}", highlight=False, soft_wrap=True)
         if any(case["status"] == "failed" for case in data["cases"]):
-            raise typer.Exit(3)
+            raise typer.Exit(FAILED)
 
 
 def _accuracy_table(data):

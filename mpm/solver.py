@@ -10,6 +10,7 @@ import numpy as np
 from mpm import stages
 from mpm.contact import FIXED_X, FIXED_Y, remap_kernel, smooth_rates, solve_dry_nodes, solve_nodes
 from mpm.points import fill, initial_stress, relocate_kernel, sort_by_element, update_order
+from mpm.spectrum import spectral_time_step
 from mpm.time_step import critical_time_step, dry_wave_speed, fast_wave_speed
 from mpm.transfer import advance_kernel, rates_kernel, update_kernel
 from mpm.variables import (
@@ -99,6 +100,7 @@ class Solver:
         self.initial = self.sums_over_points()
         self._spare = self.start.copy(), self.order.copy()
         self._moved = np.zeros(len(self.points), np.int32), np.zeros(len(self.points), np.int32)
+        self._longest_step, self._mode = math.inf, None
         self._sort()
         self._update_wave_speed()
         # the projection of the initial pore pressure: hydrostatic, exact for linear functions
@@ -178,6 +180,7 @@ class Solver:
         self._normal_open = np.array(opened, float).reshape(-1, 2)
         self.active = np.array(active_closed, np.int8)
         self._active_open = np.array(active_open, np.int8)
+        self._closed = self.normal, self.active
         self.friction = np.array(friction, float)
         self.lining = lining
         self.impulse = np.zeros((len(node), 5))
@@ -243,6 +246,12 @@ class Solver:
                         )
                     )
         self.wave_speed = max(speeds)
+        if self.scene.numerics.critical_step == "spectral" and self.n_occupied:
+            shortest = float(self.geometry[self.occupied[: self.n_occupied], 7].min())
+            certain = 0.5 * shortest / self.wave_speed if self._mode is None else 0.8 * self._longest_step
+            step, self._mode = spectral_time_step(self, certain, self._mode)
+            self.wave_speed = shortest / step
+            self._longest_step = step
 
     # -- threads --------------------------------------------------------------------------------
 
@@ -278,7 +287,8 @@ class Solver:
         """Time step of the state at hand [s] and the name of what limits it."""
         if not self._mapped:
             self.map_points()
-        return critical_time_step(self._limits, self.wave_speed, self.scene.numerics.courant)
+        limits = [*self._limits, (self._longest_step, 0.0)]
+        return critical_time_step(limits, self.wave_speed, self.scene.numerics.courant)
 
     def points_by_name(self):
         """Copy of the state of all points, one array a variable, with volume, displacement and soil number."""
@@ -338,6 +348,11 @@ class Solver:
         self.active = self._active_open
         self.gate_open = True
 
+    def close_gate(self):
+        """Put the plug back: what is in the channel stays there, and nothing follows through the face."""
+        self.normal, self.active = self._closed
+        self.gate_open = False
+
     def step(self, dt_max=math.inf):
         """Advance by one time step, not longer than dt_max [s]; returns (dt, name of its limit)."""
         numerics, density = self.scene.numerics, self._water_density
@@ -347,7 +362,7 @@ class Solver:
 
         if not self._mapped:
             self.map_points()
-        dt, limit = critical_time_step(self._limits, self.wave_speed, numerics.courant)
+        dt, limit = critical_time_step([*self._limits, (self._longest_step, 0.0)], self.wave_speed, numerics.courant)
         if dt > dt_max:
             dt, limit = dt_max, "output"
         self.over_nodes(

@@ -186,7 +186,7 @@ def relax(solver, friction, tolerance, max_steps, progress=None):
             velocity, reaction, per_range=(sums,),
         )  # fmt: skip
         energy, unbalanced, total = sums.sum(axis=0)
-        residual = float(np.sqrt(unbalanced / total))
+        residual = float(np.sqrt(unbalanced / total)) if unbalanced > 0.0 else 0.0  # no weight at all: 0 / 0
         if progress is not None and step % 50 == 0:
             progress(step, residual)
         if residual < tolerance:

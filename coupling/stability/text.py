@@ -1,0 +1,75 @@
+"""What the page of `gush stability` says around its numbers."""
+
+LINEAR = """
+## The critical time step
+
+A step of the solver is affine in the state about rest while points stay in their elements, soils are elastic and pore
+pressures positive. Steps from perturbed states, run by the solver itself, are therefore the columns of its exact
+amplification matrix; its spectral radius, bisected over the time step, gives the *actual* critical step. The program
+has two predictions, each its time step at Courant number 1: *altitude*, the smallest altitude over the undrained,
+undamped wave speed, and *spectral* (`numerics.critical_step = "spectral"`), 0.9 times the step of the largest
+eigenvalue of the points on their mesh (`mpm/spectrum.py`). The column is four cells high and two wide, of crossed
+triangles. The actual step is where a mode begins to grow by 1 % a step. "Growth" is the largest excess of the
+spectral radius over 1 at half of it, "leak" the largest share of a result outside of the invariant space on which the
+matrix is formed, which is round-off.
+"""
+
+READING = """
+- Why the altitude is so far off: velocities return to the nodes through the points, which takes the shortest waves
+  away (in one dimension with a consistent mass: a factor of sqrt(8/3) = 1.63 in the step); mean volume changes soften
+  them; drag locks the water to the grains; and a flat element has neighbours that are not. Points gathered at
+  vertices, flat elements and no smoothing make it worse than the truth. No factor on the altitude can serve: its
+  ratio varies with positions and shapes by more than 1/0.7.
+- Weak growth comes from the pressure filter together with mean volume changes; without either it is gone (trial with
+  one point per element, all within 1e-4 of a vertex). The critical step says nothing about it: it counts from 1 % a
+  step on.
+- PIC makes the critical step up to sqrt(2) smaller than FLIP; the spectral prediction counts it, the altitude's does
+  not.
+- The default is "altitude": every published number of this program was made with it. Spectral estimates are renewed
+  every 100 steps; points move in between, and the margin for that is the Courant number.
+- Both hold for resting, elastic states. Plastic flow softens. For the spectral step what is loose counts as stiff and
+  what is slack as pressed, so that closing up cannot make it too long.
+"""
+
+EXTREMES = """
+Small scenes, each in a process of its own with a time limit: a block in a closed box that loses its support, a lump
+thrown at a wall, a coarse tunnel with a gate. A run is *stable* when all of this holds, at every step or every 20
+steps:
+
+- the energy that is there (kinetic, skeleton, water) never exceeds the initial one plus the work of gravity by more
+  than 5 % of the largest energy in play;
+- the mass at the nodes is that of the points to 1e-10;
+- no stress and no pressure exceeds three times the sum of static load and Joukowsky pressure of the fastest point;
+- points stay in the mesh, porosities in their range, everything is finite;
+- no more comes in through the gate than by free discharge under the total head, and nothing while it is closed;
+- weightless ground does not move, a full tunnel stays at rest, one point falls as far and as fast as it must.
+
+*Refused* means that the scene is not accepted and says why. Everything else, a failed run included, is a bug.
+"""
+
+FOUND = """
+## What was found
+
+Numbers of this list are of trials made while this command was written; the table above is of today.
+
+- **Energy from nothing.** With mean volume changes (`volumetric_smoothing`) a dilatant Mohr-Coulomb soil gained
+  energy without limit: a block of dry sand (phi = psi = 25 degrees) threw itself 0.2 m up, with 1600 J/m of kinetic
+  energy where gravity had done less than 1 J/m of work. Stress follows the mean volume change, but the force is that
+  of the element's own stress. For elastic states both belong to one symmetric stiffness; dilatancy loads elements
+  against each other in patterns that the mean does not see, and these do work for ever. Repaired: where a soil
+  dilates, its skeleton is strained by its own element's rates, and any dilatancy up to the friction angle is sound.
+- **Own rates lock coarse channels.** With two elements across the gate a skeleton of own rates (a dilatant soil, or no
+  smoothing) lets nothing in within 0.2 s where 74 kg/m come in with mean rates. Dilatant soil needs a finer mesh at
+  the gate.
+- **No weight.** A scene without gravity divided zero by zero in its relaxation. Repaired. The drag is gravity over
+  conductivity, so it vanishes with gravity: a conductivity is that of the scene's gravity.
+- **Corners of the gate.** The corners of an open gate push in one direction only, so a tunnel filled with ground in
+  equilibrium moves there at first, at up to 0.3 m/s, and comes to rest.
+- The gate can be closed again (`Solver.close_gate`).
+
+## What is not covered
+
+Linear columns are uniform: one soil, one cell size. Kinetic energy in the water counts at the points, which move with
+the grains; water that runs through gravel carries its momentum but not its place. Runs are coarse and short; that
+they are stable says nothing about accuracy.
+"""

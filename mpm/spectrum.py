@@ -1,0 +1,164 @@
+"""The largest eigenfrequency of the points on their mesh, and the critical time step that follows from it.
+
+With nodal velocities u of both phases, a FLIP step of a resting, elastic state multiplies stresses and velocities so
+that, for every mode with stiffness k, mass m and drag c (implicit), z obeys (m + dt c) (z - 1)^2 + .. = 0, or
+    (m + dt c) z^2 - (2 m + dt c - dt^2 k) z + m = 0,
+whose roots leave the unit circle at z = -1, that is where dt^2 k = 4 m + 2 dt c. So the critical step is
+dt = 2 / sqrt(lambda) with the largest eigenvalue lambda of the stiffness over the mass plus dt/2 times the drag.
+The stiffness holds what the kernels hold: mean volume changes, element strains, pore water; the mass is that of the
+nodes, twice, with the points between (velocities return to the nodes through them, MUSL), which takes the shortest
+waves of consistent-mass kind away. Altitude over wave speed knows none of this.
+
+With a share s of PIC velocities are multiplied by g = 1 - s + s f in a step, where 0 <= f <= 1 is what the way
+through the points leaves of the mode; then dt^2 k = 2 (1 + g) m, and dt sqrt(1 - s/2) is not above any of these.
+"""
+
+import math
+
+import numpy as np
+
+from mpm.contact import FIXED_X, FIXED_Y, free_pair
+from mpm.variables import MASS, S_DRAG, S_G, S_LAMBDA, S_RHO_S, S_SIN_DIL, N, X, Y
+
+SAFETY = 0.9  # Ritz values come from below, and points move until the next estimate
+TOLERANCE = 1e-2  # of the largest eigenvalue
+ROUNDS = 3  # of the step that the drag depends on, from below, at the first call
+
+
+class Spectrum:
+    """Linear operator of a solver's state: accelerations from the stresses that nodal velocities build in a second.
+
+    Parameters
+    ----------
+    solver : mpm.solver.Solver
+        All its points count as stiff, and as under pressure: what is loose may close, what is slack may fill.
+    """
+
+    def __init__(self, solver):
+        from scipy.sparse import csr_array, diags_array
+
+        mesh, scene = solver.mesh, solver.scene
+        inside = solver.element_of_point >= 0
+        points, element = solver.points[inside], solver.element_of_point[inside]
+        soil = solver.soils[solver.soil_of_point[inside]]
+        used = np.unique(element)
+        corners, geometry = mesh.elements[used], solver.geometry[used]
+        element = np.searchsorted(used, element)
+        n_nodes, n_elements = len(mesh.nodes), len(used)
+        g = geometry[element]
+        dx, dy = points[:, X] - g[:, 4], points[:, Y] - g[:, 5]
+        n1, n2 = g[:, 0] * dx + g[:, 1] * dy, g[:, 2] * dx + g[:, 3] * dy
+        row = np.repeat(np.arange(len(points)), 3)
+        weights = np.column_stack([1 - n1 - n2, n1, n2]).ravel()
+        self.shape = csr_array((weights, (row, corners[element].ravel())), (len(points), n_nodes))
+        row, column = np.repeat(np.arange(n_elements), 3), corners.ravel()
+        gx = np.column_stack([-geometry[:, 0] - geometry[:, 2], geometry[:, 0], geometry[:, 2]]).ravel()
+        gy = np.column_stack([-geometry[:, 1] - geometry[:, 3], geometry[:, 1], geometry[:, 3]]).ravel()
+        self.gx, self.gy = (csr_array((v, (row, column)), (n_elements, n_nodes)) for v in (gx, gy))
+        porosity, mass = points[:, N], points[:, MASS]
+        volume = mass / (soil[:, S_RHO_S] * (1 - porosity))
+
+        def total(values):
+            return np.bincount(element, values, n_elements)
+
+        own = volume * (soil[:, S_SIN_DIL] > 0.0)
+        self.own = np.divide(total(own), total(volume))  # share that takes its element's own rates
+        self.lam, self.shear = total(volume * soil[:, S_LAMBDA]), total(volume * soil[:, S_G])
+        self.wet = scene.water is not None
+        self.mass, self.mass_solid = mass, self.shape.T @ mass
+        if self.wet:
+            water = volume * solver._water_density
+            self.q_solid = total(volume * solver._water_modulus * (1 - porosity) / porosity)
+            self.q_liquid = total(volume * solver._water_modulus)
+            self.water, self.mass_liquid = water, self.shape.T @ water
+            self.mass_pore = self.shape.T @ (porosity * water)
+            self.drag = self.shape.T @ (porosity * soil[:, S_DRAG] * water)
+        self.mean = None
+        if scene.numerics.volumetric_smoothing:
+            to_nodes = csr_array((np.ones(3 * n_elements), (column, row)), (n_nodes, n_elements))
+            sums = to_nodes @ total(volume)
+            inverse = np.divide(1.0, sums, out=np.zeros(n_nodes), where=sums > 0)
+            self.mean = (to_nodes.T / 3) @ diags_array(inverse) @ to_nodes @ diags_array(total(volume))
+        self.free_x = (self.mass_solid > 0) & ((solver.fixed & FIXED_X) == 0)
+        self.free_y = (self.mass_solid > 0) & ((solver.fixed & FIXED_Y) == 0)
+
+    def accelerations(self, velocity, dt):
+        """Nodal accelerations [1/s2 times velocity]: (4 or 2, n_nodes); dt [s] is that of the implicit drag."""
+        solid = velocity[:2]
+        xx, yy = self.gx @ solid[0], self.gy @ solid[1]
+        xy = 0.5 * (self.gy @ solid[0] + self.gx @ solid[1])
+        own = xx + yy
+        volume = own if self.mean is None else self.mean @ own
+        skeleton = volume + self.own * (own - volume)
+        correction = 0.5 * (skeleton - own)
+        sxx = self.lam * skeleton + 2 * self.shear * (xx + correction)
+        syy = self.lam * skeleton + 2 * self.shear * (yy + correction)
+        sxy = 2 * self.shear * xy
+        if self.wet:
+            liquid = self.gx @ velocity[2] + self.gy @ velocity[3]
+            if self.mean is not None:
+                liquid = self.mean @ liquid
+            pressure = -(self.q_solid * volume + self.q_liquid * liquid)
+            sxx, syy = sxx - pressure, syy - pressure
+        force = -(self.gx.T @ sxx + self.gy.T @ sxy), -(self.gx.T @ sxy + self.gy.T @ syy)
+        result = np.zeros_like(velocity)
+        for k, (free, gradient) in enumerate(((self.free_x, self.gx), (self.free_y, self.gy))):
+            if self.wet:
+                ms, ml, mn = self.mass_solid[free], self.mass_liquid[free], self.mass_pore[free]
+                push = (gradient.T @ pressure)[free]
+                pair = free_pair.py_func(force[k][free], push, ms, ml, mn, 0.5 * dt * self.drag[free])
+                result[k, free], result[k + 2, free] = pair
+                result[k + 2] = self._through_points(result[k + 2], self.water, self.mass_liquid, free)
+            else:
+                result[k, free] = force[k][free] / self.mass_solid[free]
+            result[k] = self._through_points(result[k], self.mass, self.mass_solid, free)
+        return result
+
+    def _through_points(self, values, mass, nodal_mass, free):
+        back = np.zeros_like(values)
+        back[free] = (self.shape.T @ (mass * (self.shape @ values)))[free] / nodal_mass[free]
+        return back
+
+    def largest(self, dt, start=None):
+        """Largest eigenvalue [1/s2] with drag over dt [s], and its mode; start: a guess of the mode."""
+        from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
+
+        shape = (4 if self.wet else 2, len(self.mass_solid))
+        size = shape[0] * shape[1]
+        operator = LinearOperator(
+            (size, size), matvec=lambda u: -self.accelerations(u.reshape(shape), dt).ravel(), dtype=float
+        )
+        if start is None:
+            start = np.random.default_rng(0).standard_normal(size)
+        try:
+            values, modes = eigs(operator, k=1, which="LM", v0=start, ncv=min(16, size), tol=TOLERANCE, maxiter=40)
+        except ArpackNoConvergence:
+            return math.inf, None
+        return float(np.abs(values[0])), np.real(modes[:, 0])
+
+
+def spectral_time_step(solver, shortest, start=None):
+    """Critical time step from the largest eigenvalue.
+
+    Parameters
+    ----------
+    solver : mpm.solver.Solver
+    shortest : float
+        A time step that is certainly not above the critical one [s]; the nearer, the sharper the drag.
+    start : (k,) float64 or None
+        Mode of an earlier call, whose step `shortest` then comes from: one round will do.
+
+    Returns
+    -------
+    dt : float
+        [s], `shortest` where the eigenvalue was not found.
+    mode : (k,) float64 or None
+    """
+    spectrum, dt = Spectrum(solver), shortest
+    for _ in range(ROUNDS if spectrum.wet and start is None else 1):
+        value, start = spectrum.largest(dt, start)
+        if not 0 < value < math.inf:
+            return shortest, None
+        dt = 2.0 / math.sqrt(value)
+    pic_share = -math.expm1(-solver.scene.numerics.pic_rate * dt)
+    return SAFETY * math.sqrt(1 - 0.5 * pic_share) * dt, start
