@@ -65,8 +65,8 @@ class Simulation:
         Built from the scene when None.
     threads : int or None
     progress : callable or None
-        Called a few times a second with a dict: stage, time, inflow_mass, dt, dt_limit,
-        point_steps_per_second, step, residual.
+        Called a few times a second with a dict: stage, time, inflow_mass, dt, dt_limit, point_steps_per_second, step,
+        share (of what the stop criterion asks for, by which the event is nearest to its end), residual.
 
     Attributes
     ----------
@@ -224,6 +224,12 @@ class Simulation:
                 "dt": (self.solver.time - self._begin) / sum(self._limits.values()),
                 "dt_limit": limit,
                 "step": self.solver.step_count,
+                "share": self._share(),
                 "point_steps_per_second": (self.solver.point_steps - point_steps) / (now - last),
             }
         )
+
+    def _share(self):
+        stop = self.scene.stop
+        pairs = ((self.solver.time, stop.time), (self._inflow, stop.inflow_mass))
+        return max(done / target for done, target in pairs if target is not None)
