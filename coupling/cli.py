@@ -1,6 +1,7 @@
 """The command line `gush`: run, rerun, plan, respond, compare, scenes, bench.
 
-Exit codes: 0 done, 1 rerun differs, 2 refused input, 3 run failed, 130 interrupted. Heavy libraries load inside the commands.
+Exit codes: 0 done, 1 rerun differs, 2 refused input, 3 run failed, 130 interrupted. Heavy libraries load inside the
+commands.
 """
 
 import contextlib
