@@ -455,6 +455,32 @@ def read_points(path, snapshot=None):
     return read_group(path, "points", snapshot)
 
 
+def raw_groups(path, groups=("mesh", "history", "lining", "points")):
+    """Arrays of a run file as they lie in it, complete records only: group to name to array.
+
+    Raises
+    ------
+    RunFileError
+        As :func:`read_pressures`.
+    """
+    import h5py
+
+    file, arrays = run_file(path), {}
+    try:
+        with _shown(file) as shown, h5py.File(shown, "r") as content:
+            for group in groups:
+                own = content[group] if group in content else {}
+                complete = np.isfinite(own["time"][()]) if "time" in own else None
+                # a scale without values stands for a dimension only
+                own = {name: data for name, data in own.items() if b"not a netCDF" not in data.attrs.get("NAME", b"")}
+                arrays[group] = {
+                    name: data[()] if data.maxshape[0] is not None else data[()][complete] for name, data in own.items()
+                }
+    except Exception as error:
+        raise RunFileError(_why_unreadable(file, None, error)) from error
+    return arrays
+
+
 def read_mesh(path):
     """The mesh: `/mesh`, in memory."""
     return read_group(path, "mesh")

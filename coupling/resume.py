@@ -6,7 +6,7 @@ import tomllib
 from dataclasses import dataclass
 
 from coupling.checkpoint import last_checkpoint
-from coupling.datasets import RunFileError, read_attributes, read_history, read_points, read_pressures
+from coupling.datasets import RunFileError, raw_groups, read_attributes
 from coupling.journal import recover
 from coupling.provenance import differences, root_attributes
 from coupling.run_folder import RUN_FILE, SCENE_FILE, RunRefused
@@ -49,9 +49,7 @@ def find_remains(folder, scene, warn):
     if file.exists():
         try:
             recover(file)
-            attributes, records = read_attributes(file), read_history(file).sizes["time"]
-            read_pressures(file)
-            read_points(file, -1 if records else None)
+            attributes, records = read_attributes(file), len(raw_groups(file)["history"]["time"])
         except RunFileError as damage:
             aside = file.with_name(f"{file.name}.damaged")
             os.replace(file, aside)

@@ -77,7 +77,7 @@ def reopened(folder):
     if not any((folder / name).is_file() for name in (RUN_FILE, SCENE_FILE)):
         raise RunRefused(
             f"output folder '{folder}': must hold the run to resume, there is neither {RUN_FILE} nor {SCENE_FILE}; "
-            "give its folder as --out, or start a run without --resume"
+            "give its folder as --out, or start a run with --overwrite instead"
         )
     with _locked(folder):
         yield folder
