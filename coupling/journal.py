@@ -34,7 +34,8 @@ class Overlay(io.RawIOBase):
     def __init__(self, path, pages=None, size=None):
         self._file = open(path, "rb", buffering=0)
         self.pages = {} if pages is None else pages
-        self.size = os.fstat(self._file.fileno()).st_size if size is None else size
+        self._size_below = self._kept = os.fstat(self._file.fileno()).st_size
+        self.size = self._size_below if size is None else size
         self._position = 0
 
     def close(self):
@@ -66,6 +67,7 @@ class Overlay(io.RawIOBase):
     def truncate(self, size=None):
         """Set the size; what lies beyond is zero when the file grows again."""
         size = self._position if size is None else size
+        self._kept = min(self._kept, size)
         if size < self.size:
             for number in [n for n in self.pages if n * PAGE >= size]:
                 del self.pages[number]
@@ -113,8 +115,14 @@ class Overlay(io.RawIOBase):
         return self.pages[number]
 
     def _below(self, offset, length):
-        read = os.pread(self._file.fileno(), length, offset)
+        read = os.pread(self._file.fileno(), max(0, min(length, self._kept - offset)), offset)
         return read + bytes(length - len(read))
+
+    def all_pages(self):
+        """Changed pages by number, with those that were cut off and are zero now."""
+        for number in range(self._kept // PAGE, -(-min(self.size, self._size_below) // PAGE)):
+            self._page(number)
+        return self.pages
 
 
 @contextlib.contextmanager
@@ -132,7 +140,7 @@ def changed(path):
     recover(path)
     with Overlay(path) as overlay:
         yield overlay
-        pages, size = overlay.pages, overlay.size
+        pages, size = overlay.all_pages(), overlay.size
     journal = journal_of(path)
     try:
         _write_journal(journal, pages, size)

@@ -202,6 +202,7 @@ def test_ctrl_c_in_a_real_run_leaves_a_readable_file(tmp_path):
     process.send_signal(signal.SIGINT)
     message = process.communicate(timeout=60)[1].decode()
     assert process.returncode == 130, message
+    assert f"gush run --resume --out {tmp_path / 'a'}" in message
     assert datasets.read_attributes(tmp_path / "a")["status"] == "interrupted"
     assert datasets.read_pressures(tmp_path / "a").sizes["time"] >= 1
 

@@ -109,7 +109,7 @@ def kill_at(call):
 
 
 # every kind of moment: scene, run file, journal, change, checkpoint, their folders, the status at the end
-@pytest.mark.parametrize("first", [2, 5, 9, 31])
+@pytest.mark.parametrize("first", [2, 9, 31])
 def test_killed_again_and_again_it_still_ends_with_the_same_bits(scene, whole, tmp_path, first):
     folder, records = tmp_path / "a", 0
     assert in_child(lambda: coupling.run(scene, folder, **OFTEN), kill_at(first)) == KILLED
@@ -277,13 +277,12 @@ def test_full_disk_ends_with_a_run_that_continues(scene, whole, tmp_path, share)
     assert records <= len(times(folder))
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-def test_threads_may_change_on_the_way(stopped, whole, tmp_path, threads, monkeypatch):
+def test_threads_may_change_on_the_way(stopped, whole, tmp_path, monkeypatch):
     import mpm.solver
 
     monkeypatch.setattr(mpm.solver, "SMALLEST_PARALLEL", 0)
     folder = shutil.copytree(stopped, tmp_path / "a")
-    coupling.run(out=folder, resume=True, threads=threads)
+    coupling.run(out=folder, resume=True, threads=2)
     assert_same(folder, whole)
 
 
