@@ -1,5 +1,6 @@
 """A simulation written as it goes, with checkpoints, and stopped by Ctrl-C between two steps."""
 
+import errno
 import hashlib
 import logging
 import shlex
@@ -17,6 +18,7 @@ from coupling.run_folder import MESH_FILE, RUN_FILE, SCENE_FILE, RunRefused
 from coupling.stop_signals import stop_signals
 
 MOST_TIME_FOR_CHECKPOINTS = 0.02  # share of the wall time that writing them may take
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 log = logging.getLogger("coupling.run")
 
@@ -68,7 +70,9 @@ class RecordedSimulation:
         except (KeyboardInterrupt, OSError, MemoryError) as error:
             reason = str(error) or type(error).__name__
             log.warning("interrupted: %s", reason)
-            error.add_note(f"what was computed is kept; continue with: {self._how_to_go_on()}")
+            full = isinstance(error, OSError) and error.errno in FULL
+            room = f"make room on the disk of '{self.folder}', then " if full else ""
+            error.add_note(f"what was computed is kept; {room}continue with: {self._how_to_go_on()}")
             self._close_if_possible(f"stopped by {reason}")
             raise
         except BaseException as error:

@@ -419,17 +419,18 @@ class Solver:
         """
         rows = self.points[self.element_of_point >= 0]
         mass = rows[:, MASS]
-        momentum = mass @ rows[:, [VSX, VSY]]
-        kinetic = 0.5 * float(mass @ (rows[:, VSX] ** 2 + rows[:, VSY] ** 2))
+        # sums, no dot products: those of BLAS depend on its number of threads in the last bits
+        momentum = np.array([np.sum(mass * rows[:, VSX]), np.sum(mass * rows[:, VSY])])
+        kinetic = 0.5 * float(np.sum(mass * (rows[:, VSX] ** 2 + rows[:, VSY] ** 2)))
         water = 0.0
         if self.scene.water is not None:
             volume = self._volumes()[self.element_of_point >= 0]
             wet = self._water_density * rows[:, N] * volume
-            momentum = momentum + wet @ rows[:, [VLX, VLY]]
-            kinetic += 0.5 * float(wet @ (rows[:, VLX] ** 2 + rows[:, VLY] ** 2))
+            momentum += np.array([np.sum(wet * rows[:, VLX]), np.sum(wet * rows[:, VLY])])
+            kinetic += 0.5 * float(np.sum(wet * (rows[:, VLX] ** 2 + rows[:, VLY] ** 2)))
             water = float(wet.sum())
             if self._water_modulus > 0:
-                water += float(wet @ rows[:, P]) / self._water_modulus
+                water += float(np.sum(wet * rows[:, P])) / self._water_modulus
         return {"momentum": momentum, "kinetic": kinetic, "water": water}
 
     def balances(self):
