@@ -1,6 +1,7 @@
 """The command line `gush`. Commands that show results or measure the program stand in modules of their own.
 
-Exit codes: 0 done, 2 refused input, 3 run failed, 130 interrupted. Heavy libraries load inside the commands.
+Exit codes: 0 done, 1 rerun differs, 2 refused input, 3 run failed, 130 interrupted. Heavy libraries load inside the
+commands.
 """
 
 import contextlib
@@ -12,7 +13,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from coupling.exit_codes import JsonPath, checked_json, failures, write_json
+from coupling.exit_codes import DIFFERENT, JsonPath, checked_json, failures, warn, write_json
 from coupling.measure_commands import accuracy_command, stability_command, study_command
 from coupling.result_commands import export_command, info_command, report_command
 
@@ -22,7 +23,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     help="Water and soil gushing into a shield tunnel: two-phase MPM, lining pressures, forces in the ring.",
-    epilog="Exit codes: 0 done, 2 refused input, 3 run failed, 130 interrupted.",
+    epilog="Exit codes: 0 done, 1 rerun differs, 2 refused input, 3 run failed, 130 interrupted.",
 )
 
 SceneName = Annotated[str, typer.Argument(help="A built-in scene (see `gush scenes`) or a TOML file.")]
@@ -35,9 +36,17 @@ Threads = Annotated[int | None, typer.Option(min=1, help="Threads; all cores whe
 
 @app.command("run")
 def run_command(
-    scene: SceneName = "quick",
+    scene: Annotated[
+        str | None, typer.Argument(help="A built-in scene (see `gush scenes`) or a TOML file; quick when left out.")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the run; runs/SCENE, numbered, when left out.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue the run in --out, however it was stopped.")
+    ] = False,
+    checkpoint_interval: Annotated[
+        float, typer.Option(min=0.0, help="Seconds between checkpoints, from which --resume goes on.")
+    ] = 60.0,
     threads: Threads = None,
     no_figures: Annotated[bool, typer.Option("--no-figures", help="No ring response, no pictures.")] = False,
     json_path: JsonPath = None,
@@ -56,9 +65,12 @@ def run_command(
         from coupling.scene import load_scene
         from coupling.summary import summarise_response, summarise_run
 
-        loaded = load_scene(scene)
-        with ProgressLine(loaded.mpm.stop, quiet) as line:
-            folder = Path(run(loaded, out, overwrite, line, threads, figures=not no_figures).attrs["run"])
+        loaded = None if resume and scene is None else load_scene(scene or "quick")
+        with ProgressLine(quiet) as line:
+            pressures = run(
+                loaded, out, overwrite, line, threads, not no_figures, resume, checkpoint_interval, warn=warn
+            )
+        folder = Path(pressures.attrs["run"])
         data = {"run": str(folder), **summarise_run(folder), "response": None}
         with contextlib.suppress(RunFileError):
             data["response"] = summarise_response(read_response(folder))
@@ -72,6 +84,37 @@ def run_command(
                 console.print(_response_table(data["response"]))
             console.print(f"errors: {quality_line(data['quality'])}", highlight=False)
             console.print(f"results in {folder}", highlight=False, soft_wrap=True)
+
+
+@app.command("rerun")
+def rerun_command(
+    run: Annotated[Path, typer.Argument(help="Folder or run.nc of the run to repeat.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the repetition; runs/SCENE-rerun, numbered, when left out.")
+    ] = None,
+    threads: Threads = None,
+    json_path: JsonPath = None,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Print errors only.")] = False,
+):
+    """Repeat a run from what its file says and compare all records bit for bit; exit code 1 when they differ.
+
+    JSON: keys of `coupling.rerun.rerun`.
+    """
+    with failures(), checked_json(json_path):
+        from coupling.rerun import rerun
+
+        with ProgressLine(quiet) as line:
+            data = rerun(run, out, line, threads, warn)
+        write_json(json_path, data)
+        if not quiet and str(json_path) != "-":
+            tell = Console().print
+            for row in data["differences"]:
+                tell(f"{row['variable']}: first at t {row['time']} s, by at most {row['largest']}", highlight=False)
+            of = f" of {data['records_run']}" if data["records"] < data["records_run"] else ""
+            verdict = "identical bit for bit" if data["identical"] else "different"
+            tell(f"{verdict}: {data['records']}{of} records of {run} and {data['rerun']}", soft_wrap=True)
+    if not data["identical"]:
+        raise typer.Exit(DIFFERENT)
 
 
 @app.command("plan")
@@ -225,13 +268,11 @@ class ProgressLine:
 
     Parameters
     ----------
-    stop : mpm.scene.Stop
-        What the time left is estimated from.
     quiet : bool
     """
 
-    def __init__(self, stop, quiet=False):
-        self._stop, self._begin = stop, None
+    def __init__(self, quiet=False):
+        self._begin = None
         self._console = Console(stderr=True)
         self._status = None
         if self._console.is_terminal and not quiet:
@@ -259,7 +300,7 @@ class ProgressLine:
         if stage != "gush":
             return {"mesh": "meshing", "respond": "ring response", "figures": "pictures"}.get(stage, stage)
         if self._begin is None:
-            self._begin = clock.monotonic()
+            self._begin = clock.monotonic(), state["share"]
         return (
             f"t {state['time']:.3f} s  inflow {state['inflow_mass']:.0f} kg/m  "
             f"dt {1e6 * state['dt']:.0f} µs ({state['dt_limit']})  "
@@ -267,15 +308,11 @@ class ProgressLine:
         )
 
     def _left(self, state):
-        shares = [
-            done / target
-            for done, target in ((state["time"], self._stop.time), (state["inflow_mass"], self._stop.inflow_mass))
-            if target is not None
-        ]
-        share, elapsed = max(shares), clock.monotonic() - self._begin
-        if share < 0.01 or elapsed < 1.0:
+        begin, share_before = self._begin
+        share, elapsed = min(state["share"], 1.0), clock.monotonic() - begin
+        if share - share_before < 0.01 or elapsed < 1.0:
             return "?"
-        return _duration(elapsed * (1 - min(share, 1.0)) / share)
+        return _duration(elapsed * (1 - share) / (share - share_before))
 
 
 def _scene_row(scene):

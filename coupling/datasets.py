@@ -5,13 +5,17 @@ uniform theta grid), `/history` (inflow, zones, balances, time step), `/points` 
 `/structure/<model>` (responses). The root carries attributes only: provenance and `status`.
 """
 
+import contextlib
+import io
 import math
 import os
+import shutil
 import time as clock
 from pathlib import Path
 
 import numpy as np
 
+from coupling.journal import changed, put_in_place, readable, recover, replace_file
 from mpm.variables import CLAMPS, POINT_VARIABLES
 
 STATUSES = ("running", "finished", "failed", "interrupted")
@@ -128,7 +132,8 @@ def cell_mean_weights(theta):
 class RunWriter:
     """Appends records to a run file that any reader can open at any moment, also after a kill.
 
-    Each batch opens the file, grows the dimensions, writes the data, the times last, and closes it.
+    Each batch opens the file, grows the dimensions, writes the data, the times last, and closes it; it reaches the
+    file as a whole or not at all (see `coupling.journal`).
 
     Parameters
     ----------
@@ -143,12 +148,38 @@ class RunWriter:
     """
 
     def __init__(self, path, attributes, scene, mesh=None):
+        self._start(path, scene, 0, 0)
+        self._create(attributes, geometry_attributes(scene), mesh)
+
+    @classmethod
+    def continued(cls, path, scene, records, snapshots, **attributes):
+        """Writer for a file that holds at least so many records and snapshots; what follows is written over.
+
+        Parameters
+        ----------
+        path, scene
+            As of the class.
+        records, snapshots : int
+            Rows that are kept; rows behind them stay until they are written again.
+        **attributes
+            Root attributes to set.
+        """
+        writer = cls.__new__(cls)
+        writer._start(path, scene, records, snapshots)
+        write_attributes(path, status="running", status_message="", **attributes)
+        return writer
+
+    def _start(self, path, scene, records, snapshots):
         self.path = Path(path)
         self._waiting, self._last_write = [], -math.inf
         self._weights = {}
-        self._count = self._snapshots = 0
+        self._count, self._snapshots = records, snapshots
         self._n_tunnels = len(scene.tunnels)
-        self._create(attributes, geometry_attributes(scene), mesh)
+
+    @property
+    def written(self):
+        """Records and snapshots that are in the file for good."""
+        return {"records": self._count, "snapshots": self._snapshots}
 
     def append(self, record):
         """Take one `mpm.Record`; it reaches the file at once or with the next batch, within about a second."""
@@ -181,7 +212,8 @@ class RunWriter:
     def _create(self, attributes, geometry, mesh):
         import h5netcdf
 
-        with h5netcdf.File(self.path, "w") as file:
+        image = io.BytesIO()
+        with h5netcdf.File(image, "w") as file:
             for name, value in {**attributes, "status": "running", "status_message": ""}.items():
                 file.attrs[name] = value
             space = ("tunnel", "theta") if self._n_tunnels > 1 else ("theta",)
@@ -213,6 +245,7 @@ class RunWriter:
             points.attrs["comment"] = "values of one time are in no particular order; padded with NaN"
             if mesh is not None:
                 _write_mesh(file.create_group("mesh"), mesh, geometry)
+        replace_file(self.path, image.getbuffer())
 
     @staticmethod
     def _create_group(file, name, attributes):
@@ -225,7 +258,7 @@ class RunWriter:
 
     def _write_lining(self, group, batch):
         rows = slice(self._count, self._count + len(batch))
-        group.resize_dimension("time", rows.stop)
+        _grow_to(group, rows.stop)
         for name in PRESSURES if self._n_tunnels else ():
             values = np.array([[self._resample(t, part, name) for t, part in enumerate(r.lining)] for r in batch])
             group[name][rows] = values if self._n_tunnels > 1 else values[:, 0]
@@ -240,7 +273,7 @@ class RunWriter:
 
     def _write_history(self, group, batch):
         rows = slice(self._count, self._count + len(batch))
-        group.resize_dimension("time", rows.stop)
+        _grow_to(group, rows.stop)
         for name in HISTORY:
             if name.startswith("clamp_"):
                 values = [record.clamp_counts.get(name.removeprefix("clamp_"), 0) for record in batch]
@@ -262,7 +295,7 @@ class RunWriter:
                     _variable(group, name, ("time", "point"), "f4", meaning, (1, most), fill=np.nan, compress=True)
         group.resize_dimension("point", max(most, group.dimensions["point"].size))
         rows = slice(self._snapshots, self._snapshots + len(snapshots))
-        group.resize_dimension("time", rows.stop)
+        _grow_to(group, rows.stop)
         for k, record in enumerate(snapshots, start=self._snapshots):
             present = ~record.points.get("removed", np.zeros(len(record.points["x"]), bool))
             for name in POINTS:
@@ -299,14 +332,22 @@ def write_attributes(path, **attributes):
 
 
 def write_response(path, response, model="beam-spring"):
-    """Write the response of a lining model to `/structure/<model>`, in place of an earlier one."""
+    """Write the response of a lining model to `/structure/<model>`, in place of an earlier one, as a whole."""
     import h5py
 
-    with h5py.File(path, "a", locking=False) as file:
-        structure = file.require_group("structure")
-        if model in structure:
-            del structure[model]
-    response.to_netcdf(path, mode="a", group=f"structure/{model}", engine="h5netcdf")
+    path = Path(path).resolve()
+    recover(path)
+    beside = path.with_name(f"{path.name}.tmp")
+    try:
+        shutil.copy(path, beside)
+        with h5py.File(beside, "a", locking=False) as file:
+            structure = file.require_group("structure")
+            if model in structure:
+                del structure[model]
+        response.to_netcdf(beside, mode="a", group=f"structure/{model}", engine="h5netcdf")
+        put_in_place(beside, path)
+    finally:
+        beside.unlink(missing_ok=True)
 
 
 def _write_mesh(group, mesh, geometry):
@@ -330,11 +371,17 @@ def _variable(group, name, dimensions, kind, meaning, chunks=None, fill=None, co
     return variable
 
 
+@contextlib.contextmanager
 def _append_to(path):
     import h5netcdf
 
-    # without locks, a reader that holds the file cannot break the run
-    return h5netcdf.File(path, "a", locking=False)
+    with changed(path) as whole, h5netcdf.File(whole, "r+") as file:
+        yield file
+
+
+def _grow_to(group, rows):
+    # never shrinks: a continued run may find records that it is about to compute again
+    group.resize_dimension("time", max(rows, group.dimensions["time"].size))
 
 
 def _limit_flag(name):
@@ -369,7 +416,7 @@ def read_run(path):
 def _group_names(file):
     import h5netcdf
 
-    with h5netcdf.File(file, "r") as content:
+    with _shown(file) as shown, h5netcdf.File(shown, "r") as content:
         names = [name for name in content.groups if name != "structure"]
         if "structure" in content.groups:
             names += [f"structure/{model}" for model in content["structure"].groups]
@@ -408,6 +455,32 @@ def read_points(path, snapshot=None):
     return read_group(path, "points", snapshot)
 
 
+def raw_groups(path, groups=("mesh", "history", "lining", "points")):
+    """Arrays of a run file as they lie in it, complete records only: group to name to array.
+
+    Raises
+    ------
+    RunFileError
+        As :func:`read_pressures`.
+    """
+    import h5py
+
+    file, arrays = run_file(path), {}
+    try:
+        with _shown(file) as shown, h5py.File(shown, "r") as content:
+            for group in groups:
+                own = content[group] if group in content else {}
+                complete = np.isfinite(own["time"][()]) if "time" in own else None
+                # a scale without values stands for a dimension only
+                own = {name: data for name, data in own.items() if b"not a netCDF" not in data.attrs.get("NAME", b"")}
+                arrays[group] = {
+                    name: data[()] if data.maxshape[0] is not None else data[()][complete] for name, data in own.items()
+                }
+    except Exception as error:
+        raise RunFileError(_why_unreadable(file, None, error)) from error
+    return arrays
+
+
 def read_mesh(path):
     """The mesh: `/mesh`, in memory."""
     return read_group(path, "mesh")
@@ -427,7 +500,10 @@ def _read(file, group, row=None):
     import xarray as xr
 
     try:
-        with xr.open_dataset(file, group=group, engine="h5netcdf", decode_times=False) as dataset:
+        with (
+            _shown(file) as shown,
+            xr.open_dataset(shown, group=group, engine="h5netcdf", decode_times=False) as dataset,
+        ):
             if "time" in dataset.coords:
                 # a batch cut short by a kill has no time yet: it was written last
                 complete = np.isfinite(np.atleast_1d(dataset["time"].values))
@@ -442,6 +518,17 @@ def _read(file, group, row=None):
         raise
     except Exception as error:
         raise RunFileError(_why_unreadable(file, group, error)) from error
+
+
+@contextlib.contextmanager
+def _shown(file):
+    """The file, complete also where a kill left its last change in the journal."""
+    shown = readable(file)
+    try:
+        yield shown
+    finally:
+        if not isinstance(shown, Path):
+            shown.close()
 
 
 def _why_unreadable(file, group, error):

@@ -1,6 +1,6 @@
 """What the command line says when something goes wrong, and its JSON output.
 
-Exit codes: 0 done, 2 refused input, 3 run failed, 130 interrupted.
+Exit codes: 0 done, 1 rerun differs, 2 refused input, 3 run failed, 130 interrupted.
 """
 
 import contextlib
@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-REFUSED, FAILED, INTERRUPTED = 2, 3, 130
+DIFFERENT, REFUSED, FAILED, INTERRUPTED = 1, 2, 3, 130
 
 JsonPath = Annotated[Path | None, typer.Option("--json", help="Also write the result as JSON; - prints it.")]
 
@@ -22,8 +22,9 @@ def failures():
     """Turn what a user can cause into one message and an exit code."""
     try:
         yield
-    except KeyboardInterrupt:
-        complain("interrupted; what was computed stays readable", INTERRUPTED)
+    except KeyboardInterrupt as interrupt:
+        by = f" by {interrupt}" if str(interrupt) else ""
+        complain("\n".join([f"interrupted{by}", *getattr(interrupt, "__notes__", ())]), INTERRUPTED)
     except (ValueError, RuntimeError, MemoryError, OSError) as error:
         code = _exit_code(error)
         if code is None:
@@ -80,3 +81,8 @@ def complain(message, code):
     """Print a message to standard error and leave with an exit code."""
     Console(stderr=True).print(message, style="red", markup=False, highlight=False, soft_wrap=True)
     raise typer.Exit(code)
+
+
+def warn(message):
+    """Print a warning to standard error."""
+    Console(stderr=True).print(message, style="yellow", markup=False, highlight=False, soft_wrap=True)

@@ -1,12 +1,15 @@
 """Where a result comes from: scene, versions and revision as the root attributes of a run file."""
 
 import hashlib
+import platform
 import subprocess
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 
-PACKAGES = ("numpy", "numba", "scipy", "xarray", "h5netcdf", "gmsh")
+PACKAGES = ("numpy", "numba", "llvmlite", "scipy", "xarray", "h5py", "h5netcdf", "gmsh")
+#: Root attributes, and packages of `versions`, that the bits of a simulation depend on, the processor apart.
+DECISIVE = ("scene", "source", "solver_sha256", "numpy", "numba", "llvmlite")
 
 
 def root_attributes(scene):
@@ -18,11 +21,48 @@ def root_attributes(scene):
         "source": f"gushing {_version('gushing')}",
         "revision": revision(),
         "versions": ", ".join(f"{name} {_version(name)}" for name in PACKAGES),
+        "solver_sha256": solver_sha256(),
+        "python": platform.python_version(),
+        "processor": _processor(),
+        "random_numbers": "none: neither mesh nor simulation draws any",
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "scene_name": scene.name,
         "scene": text,
         "scene_sha256": hashlib.sha256(text.encode()).hexdigest(),
     }
+
+
+def solver_sha256():
+    """Hash of all sources of the package `mpm`, which compute the mesh and the simulation."""
+    digest = hashlib.sha256()
+    home = Path(__file__).resolve().parent.parent / "mpm"
+    for file in sorted(home.rglob("*.py")):
+        digest.update(f"{file.relative_to(home).as_posix()} {file.stat().st_size}\n".encode() + file.read_bytes())
+    return digest.hexdigest()
+
+
+def differences(stored, now, names=DECISIVE):
+    """Names among `names` whose values differ between two sets of root attributes, with both values.
+
+    Returns
+    -------
+    dict of str to (str, str)
+        Name to the stored and the present value; "unknown" for what is not stored.
+    """
+    stored, now = ({**attributes, **_by_package(attributes.get("versions", ""))} for attributes in (stored, now))
+    pairs = {name: (str(stored.get(name, "unknown")), str(now.get(name, "unknown"))) for name in names}
+    return {name: pair for name, pair in pairs.items() if pair[0] != pair[1]}
+
+
+def _by_package(versions):
+    return dict(entry.split(" ", 1) for entry in versions.split(", ") if " " in entry)
+
+
+def _processor():
+    """The processor as the compiler of the kernels names it: the machine code depends on it."""
+    import llvmlite.binding
+
+    return f"{platform.machine()} {llvmlite.binding.get_host_cpu_name()}"
 
 
 def _version(package):

@@ -2,34 +2,28 @@
 
 import contextlib
 import logging
-import time as clock
 
-from coupling.datasets import RunWriter, read_history, read_pressures, write_attributes, write_response
-from coupling.provenance import root_attributes
-from coupling.quality import quality, quality_attributes, quality_line
-from coupling.run_folder import (
-    FIGURES,
-    LOG_FILE,
-    MESH_FILE,
-    RUN_FILE,
-    SCENE_FILE,
-    RunRefused,
-    claimed,
-    default_folder,
-)
+from coupling.checkpoint import remove_checkpoints
+from coupling.datasets import read_pressures, write_response
+from coupling.recorded_simulation import RecordedSimulation, write_quality
+from coupling.resume import find_remains
+from coupling.run_folder import FIGURES, LOG_FILE, RUN_FILE, RunRefused, claimed, default_folder, reopened
 
 BYTES_PER_ELEMENT = 2000  # points, buffers and the copy made while sorting, of a case with 3 points an element
 
 log = logging.getLogger(__name__)
 
 
-def run(scene, out=None, overwrite=False, progress=None, threads=None, figures=False):
+def run(
+    scene=None, out=None, overwrite=False, progress=None, threads=None, figures=False, resume=False,
+    checkpoint_interval=60.0, warn=None,
+):  # fmt: skip
     """Simulate a scene and return the pressures on the lining through time.
 
     Parameters
     ----------
-    scene : coupling.Scene
-        From :func:`coupling.load_scene`.
+    scene : coupling.Scene or None
+        From :func:`coupling.load_scene`. None: that of the run to resume.
     out : str, path or None
         Folder for `run.nc` (written as the run goes on), `mesh.vtu`, `scene.toml`, `run.log` and `figures/`.
         None: `runs/<scene>` in the current folder, numbered when that one is taken.
@@ -42,6 +36,12 @@ def run(scene, out=None, overwrite=False, progress=None, threads=None, figures=F
         None: all cores. The result does not depend on it.
     figures : bool
         Also compute the response of the scene's ring into `/structure/beam-spring` and draw all pictures.
+    resume : bool
+        Continue the run in `out`, however it was stopped, to the bits that it would have had uninterrupted.
+    checkpoint_interval : float
+        Wall time between checkpoints [s].
+    warn : callable or None
+        Called with what a user should know and the log says too: damaged files, another processor.
 
     Returns
     -------
@@ -51,22 +51,47 @@ def run(scene, out=None, overwrite=False, progress=None, threads=None, figures=F
     Raises
     ------
     RunRefused
-        Before anything starts: folder in use, not writable, not empty; too little memory.
+        Before anything starts: folder in use, not writable, not empty; too little memory; nothing to resume, or with
+        another scene or version.
     mpm.RunFailed
         Non-finite values or no initial equilibrium; the file stays readable, with status 'failed'.
     KeyboardInterrupt
-        Ctrl-C; the file stays readable, with status 'interrupted'.
+        Ctrl-C, SIGTERM; the file stays readable, with status 'interrupted', and the run can be resumed.
+    OSError
+        Disk full, for instance; the same.
     """
-    check_memory(scene.mpm)
+    if resume and (out is None or overwrite):
+        raise RunRefused("--resume: needs the folder of the run, and no --overwrite; give it as --out DIR")
+    if not resume:
+        if scene is None:
+            raise RunRefused("scene: must be given unless a run is resumed; load one with coupling.load_scene")
+        check_memory(scene.mpm)
+        out = default_folder(scene.name) if out is None else out
     report = progress if progress is not None else lambda state: None
-    out = default_folder(scene.name) if out is None else out
-    with claimed(out, overwrite) as folder, _logged_to(folder / LOG_FILE):
-        _simulate(scene, folder, report, threads)
+    held = reopened(out) if resume else claimed(out, overwrite)
+    with held as folder, _logged_to(folder / LOG_FILE):
+        remains = find_remains(folder, scene, _teller(warn)) if resume else None
+        if remains is not None:
+            scene = remains.scene
+            check_memory(scene.mpm)
+        if remains is not None and remains.finished:
+            remove_checkpoints(folder)
+        else:
+            RecordedSimulation(scene, folder, report, threads, checkpoint_interval, remains).run()
         if figures:
             finish(scene, folder, report)
         pressures = read_pressures(folder)
     pressures.attrs |= {"run": str(folder), "scene_name": scene.name}
     return pressures
+
+
+def _teller(warn):
+    def tell(message):
+        log.warning("%s", message)
+        if warn is not None:
+            warn(message)
+
+    return tell
 
 
 def finish(scene, folder, progress):
@@ -77,7 +102,7 @@ def finish(scene, folder, progress):
         progress({"stage": "respond"})
         response = respond(scene, read_pressures(folder))
         write_response(folder / RUN_FILE, response)
-        _write_quality(folder / RUN_FILE, response)
+        write_quality(folder / RUN_FILE, response)
     progress({"stage": "figures"})
     return draw_run(folder, folder / FIGURES)
 
@@ -134,60 +159,10 @@ def free_memory_bytes():
     return None
 
 
-def _simulate(scene, folder, report, threads):
-    import mpm
-
-    attributes = root_attributes(scene)
-    (folder / SCENE_FILE).write_text(attributes["scene"], encoding="utf-8")
-    wall, cpu = clock.monotonic(), clock.process_time()
-    log.info("scene %s, %s, revision %s", scene.name, attributes["source"], attributes["revision"] or "unknown")
-    report({"stage": "mesh"})
-    mesh = mpm.build_mesh(scene.mpm)
-    mesh.save(folder / MESH_FILE)
-    log.info("mesh: %s", ", ".join(f"{name} {value:.4g}" for name, value in mesh.quality.items()))
-    writer = RunWriter(folder / RUN_FILE, attributes, scene.mpm, mesh)
-
-    def close(status, message=""):
-        writer.close(
-            status, message, wall_seconds=clock.monotonic() - wall, cpu_seconds=clock.process_time() - cpu,
-        )  # fmt: skip
-        _write_quality(folder / RUN_FILE)
-
-    try:
-        for record in mpm.simulate(scene.mpm, mesh, threads, report):
-            writer.append(record)
-            log.info(
-                "t %.6g s  inflow %.6g kg/m  flow zone %.5g m2  dt %.3g s (%s)  steps %d",
-                *(record.time, record.inflow_mass, record.flow_zone_area, record.dt, record.dt_limit, record.steps),
-            )
-    except mpm.RunFailed as failure:
-        log.error("failed: %s", failure)
-        close("failed", str(failure))
-        failure.add_note(f"what was computed until then is in {folder}")
-        raise
-    except KeyboardInterrupt:
-        log.warning("interrupted")
-        close("interrupted", "stopped by the user")
-        raise
-    except BaseException as error:
-        log.exception("failed")
-        close("failed", f"{type(error).__name__}: {error}")
-        raise
-    close("finished")
-    log.info("finished in %.1f s", clock.monotonic() - wall)
-
-
-def _write_quality(file, response=None):
-    history = read_history(file)
-    if history.sizes["time"]:
-        values = quality(history, response)
-        write_attributes(file, **quality_attributes(values))
-        log.info("quality: %s", quality_line(values))
-
-
 @contextlib.contextmanager
 def _logged_to(path):
     handler = logging.FileHandler(path, encoding="utf-8")
+    handler.handleError = lambda record: None  # a full disk stops the run where it loses something
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
     level = log.level
     log.addHandler(handler)

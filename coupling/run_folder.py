@@ -5,6 +5,8 @@ import fcntl
 import os
 from pathlib import Path
 
+from coupling.checkpoint import remove_checkpoints
+
 RUN_FILE, MESH_FILE, SCENE_FILE, LOG_FILE, FIGURES = "run.nc", "mesh.vtu", "scene.toml", "run.log", "figures"
 REPORT_FILE, FIELDS = "report.html", "fields"
 LOCK_FILE = ".lock"
@@ -46,23 +48,50 @@ def claimed(folder, overwrite=False):
         raise RunRefused(f"output folder '{folder}': it, or one above it, is a file; choose another --out") from None
     except OSError as error:
         raise RunRefused(f"output folder '{folder}': cannot be made: {error.strerror}; choose another --out") from None
-    lock = _lock(folder)
-    try:
+    with _locked(folder):
         content = _content(folder)
         if content and not overwrite:
             shown = ", ".join(content[:3]) + (", .." if len(content) > 3 else "")
             raise RunRefused(
                 f"output folder '{folder}': not empty, it holds {shown}; choose another --out, "
-                "or ask for --overwrite (overwrite=True) to replace the run in it"
+                "ask for --overwrite (overwrite=True) to replace the run in it, or for --resume to continue it"
             )
         for name in (RUN_FILE, MESH_FILE, SCENE_FILE, LOG_FILE, REPORT_FILE):
             (folder / name).unlink(missing_ok=True)
+            (folder / f"{name}.journal").unlink(missing_ok=True)
+        remove_checkpoints(folder)
         for picture in (folder / FIGURES).glob("*.png"):
             picture.unlink()
         for fields in (folder / FIELDS).glob("*"):
             if fields.suffix in (".vtu", ".pvd", ".xdmf", ".h5", ".gif"):
                 fields.unlink()
         yield folder
+
+
+@contextlib.contextmanager
+def reopened(folder):
+    """Hold the folder of an earlier run to continue it; nothing in it is touched.
+
+    Raises
+    ------
+    RunRefused
+        No run in it, in use by another run, or not writable.
+    """
+    folder = Path(folder)
+    if not any((folder / name).is_file() for name in (RUN_FILE, SCENE_FILE)):
+        raise RunRefused(
+            f"output folder '{folder}': must hold the run to resume, there is neither {RUN_FILE} nor {SCENE_FILE}; "
+            "give its folder as --out, or start a run with --overwrite instead"
+        )
+    with _locked(folder):
+        yield folder
+
+
+@contextlib.contextmanager
+def _locked(folder):
+    lock = _lock(folder)
+    try:
+        yield
     finally:
         with contextlib.suppress(OSError):
             (folder / LOCK_FILE).unlink()

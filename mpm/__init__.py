@@ -1,8 +1,8 @@
 """Two-phase material point method: soil and water around a shield tunnel, and their pressure on its lining."""
 
 _HOME = {
-    "Record": "simulation", "simulate": "simulation", "RunFailed": "solver", "Solver": "solver",
-    "Scene": "scene", "Mesh": "mesh", "build_mesh": "mesh",
+    "Record": "simulation", "simulate": "simulation", "Simulation": "simulation", "RunFailed": "solver",
+    "Solver": "solver", "Scene": "scene", "Mesh": "mesh", "build_mesh": "mesh",
 }  # fmt: skip
 __all__ = sorted(_HOME)
 

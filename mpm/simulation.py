@@ -1,5 +1,6 @@
 """A whole event: initial state, gate opens, records of interval means until the stop criterion."""
 
+import json
 import time as clock
 from dataclasses import dataclass
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from mpm.mesh import build_mesh
 from mpm.solver import RunFailed, Solver
+from mpm.state import restore_solver, solver_state
 from mpm.variables import CLAMPS
 
 STEPS_BETWEEN_CHECKS = 50
@@ -45,6 +47,17 @@ class Record:
 def simulate(scene, mesh=None, threads=None, progress=None):
     """Run a scene and yield one `Record` per output interval, the relaxed initial state first.
 
+    Parameters and errors as of :class:`Simulation`.
+    """
+    simulation = Simulation(scene, mesh, threads, progress)
+    yield simulation.begin()
+    while not simulation.done:
+        yield simulation.advance()
+
+
+class Simulation:
+    """An event that goes on interval by interval, and can be stored and continued between any two of its steps.
+
     Parameters
     ----------
     scene : mpm.scene.Scene
@@ -52,31 +65,138 @@ def simulate(scene, mesh=None, threads=None, progress=None):
         Built from the scene when None.
     threads : int or None
     progress : callable or None
-        Called a few times a second with a dict: stage, time, inflow_mass, dt, dt_limit,
-        point_steps_per_second, step, residual.
+        Called a few times a second with a dict: stage, time, inflow_mass, dt, dt_limit, point_steps_per_second, step,
+        share (of what the stop criterion asks for, by which the event is nearest to its end), residual.
 
-    Raises
-    ------
-    RunFailed
-        When a point becomes non-finite or the initial state does not settle; what was yielded stays valid.
+    Attributes
+    ----------
+    done : bool
+        Whether the stop criterion is reached and the last record returned.
     """
-    solver = Solver(scene, mesh if mesh is not None else build_mesh(scene), threads)
-    cpu_start = clock.process_time()
 
-    def report_relaxation(step, residual):
-        if progress is not None:
-            progress({"stage": "relax", "step": step, "residual": residual, "time": 0.0, "inflow_mass": 0.0})
+    def __init__(self, scene, mesh=None, threads=None, progress=None):
+        self.scene = scene
+        self.solver = Solver(scene, mesh if mesh is not None else build_mesh(scene), threads)
+        self.done = False
+        self._cpu_begin = clock.process_time()
+        self._interval, self._inside = 0, False  # number of the interval at hand; whether it has begun
+        self._reached = False  # whether the last interval is at hand
+        self._begin, self._limits = 0.0, {}
+        self._next_snapshot = scene.output.snapshot_interval or np.inf
+        self._inflow = 0.0
+        self._progress = progress
+        self._last_report = clock.monotonic(), 0
 
-    steps, residual = solver.relax(report_relaxation)
-    if residual > scene.numerics.relaxation_tolerance:
-        raise RunFailed(
-            f"the initial state did not settle: residual {residual:.2g} after {steps} steps, "
-            f"tolerance {scene.numerics.relaxation_tolerance:.2g}; raise numerics.max_relaxation_steps",
-            0.0,
-            solver.mesh.nodes.mean(axis=0),
-        )
+    def begin(self):
+        """Settle the initial state, open the gate, and return the `Record` of the state before that.
 
-    def record(duration, dt, limit, snapshot):
+        Raises
+        ------
+        RunFailed
+            When the initial state does not settle.
+        """
+        solver, numerics = self.solver, self.scene.numerics
+
+        def report(step, residual):
+            if self._progress is not None:
+                self._progress({"stage": "relax", "step": step, "residual": residual, "time": 0.0, "inflow_mass": 0.0})
+
+        steps, residual = solver.relax(report)
+        if residual > numerics.relaxation_tolerance:
+            raise RunFailed(
+                f"the initial state did not settle: residual {residual:.2g} after {steps} steps, "
+                f"tolerance {numerics.relaxation_tolerance:.2g}; raise numerics.max_relaxation_steps",
+                0.0,
+                solver.mesh.nodes.mean(axis=0),
+            )
+        record = self._record(1.0, *solver.time_step_estimate(), True)
+        solver.open_gate()
+        self._last_report = clock.monotonic(), solver.point_steps
+        return record
+
+    def advance(self, pause=None):
+        """Step to the end of the interval at hand and return its `Record`, or None where `pause` asked to stop.
+
+        Parameters
+        ----------
+        pause : callable or None
+            Asked after every step; when it returns True the state can be stored, and `advance` called again.
+
+        Raises
+        ------
+        RunFailed
+            When a point becomes non-finite; what was returned stays valid.
+        """
+        solver, stop, output = self.solver, self.scene.stop, self.scene.output
+        if not self._inside:
+            self._interval += 1
+            self._begin, self._limits, self._inside = solver.time, {}, True
+            solver.impulse[:] = 0.0
+        end = self._interval * output.interval
+        if stop.time is not None:
+            end = min(end, stop.time)
+        while solver.time < end * (1 - 1e-12) and not self._reached:
+            _, limit = solver.step(end - solver.time)
+            self._limits[limit] = self._limits.get(limit, 0) + 1
+            if solver.step_count % STEPS_BETWEEN_CHECKS == 0:
+                self._inflow = solver.inflow_mass()
+                self._reached = stop.inflow_mass is not None and self._inflow >= stop.inflow_mass
+            self._report(limit)
+            if pause is not None and pause():
+                return None
+        self.done = self._reached or (stop.time is not None and solver.time >= stop.time * (1 - 1e-12))
+        snapshot = self.done or solver.time >= self._next_snapshot * (1 - 1e-12)
+        if snapshot:
+            self._next_snapshot = solver.time + (output.snapshot_interval or np.inf)
+        self._inside = False
+        duration, count = solver.time - self._begin, sum(self._limits.values())
+        limits = {name: steps for name, steps in self._limits.items() if name != "output"} or self._limits
+        return self._record(duration, duration / count, max(limits, key=limits.get), snapshot)
+
+    def state(self):
+        """All that decides how the simulation goes on, and its processor time so far.
+
+        Returns
+        -------
+        dict of str to array, float, int, bool or str
+            The arrays are the solver's own: store them before the next step.
+        """
+        return {
+            **solver_state(self.solver),
+            "interval": self._interval,
+            "inside_interval": self._inside,
+            "interval_begin": self._begin,
+            "interval_limits": json.dumps(self._limits),  # in the order met, which decides between equals
+            "next_snapshot": self._next_snapshot,
+            "inflow_mass": self._inflow,
+            "reached": self._reached,
+            "done": self.done,
+            "cpu_seconds": self.cpu_seconds,
+        }
+
+    def restore(self, state):
+        """Continue from a `state` of the same scene and mesh, in place of `begin`: the same bits from here on.
+
+        Raises
+        ------
+        ValueError
+            When the state is that of another scene or mesh.
+        """
+        restore_solver(self.solver, state)
+        self._interval, self._inside = int(state["interval"]), bool(state["inside_interval"])
+        self._begin, self._limits = float(state["interval_begin"]), json.loads(state["interval_limits"])
+        self._next_snapshot, self._inflow = float(state["next_snapshot"]), float(state["inflow_mass"])
+        self._reached, self.done = bool(state["reached"]), bool(state["done"])
+        self._cpu_begin = clock.process_time() - float(state["cpu_seconds"])
+        self._last_report = clock.monotonic(), self.solver.point_steps
+
+    @property
+    def cpu_seconds(self):
+        """Processor time of the simulation, that before it was restored included [s]."""
+        return clock.process_time() - self._cpu_begin
+
+    def _record(self, duration, dt, limit, snapshot):
+        solver = self.solver
         return Record(
             time=solver.time,
             dt=dt,
@@ -86,52 +206,30 @@ def simulate(scene, mesh=None, threads=None, progress=None):
             clamp_counts=dict(zip(CLAMPS, solver.clamps.sum(axis=0).tolist(), strict=True)),
             balances=solver.balances(),
             point_steps=solver.point_steps,
-            cpu_seconds=clock.process_time() - cpu_start,
+            cpu_seconds=self.cpu_seconds,
             points=solver.points_by_name() if snapshot else None,
             **solver.measures(),
         )
 
-    yield record(1.0, *solver.time_step_estimate(), True)
-    solver.open_gate()
-    stop, output = scene.stop, scene.output
-    interval_index, last_report, next_snapshot = 0, clock.monotonic(), output.snapshot_interval or np.inf
-    report_time, report_steps = clock.monotonic(), 0
-    inflow = 0.0
-    while True:
-        interval_index += 1
-        begin, end = solver.time, interval_index * output.interval
-        if stop.time is not None:
-            end = min(end, stop.time)
-        solver.impulse[:] = 0.0
-        count, limits, done = 0, {}, False
-        while solver.time < end * (1 - 1e-12) and not done:
-            _, limit = solver.step(end - solver.time)
-            count += 1
-            limits[limit] = limits.get(limit, 0) + 1
-            if solver.step_count % STEPS_BETWEEN_CHECKS == 0:
-                inflow = solver.inflow_mass()
-                done = stop.inflow_mass is not None and inflow >= stop.inflow_mass
-            now = clock.monotonic()
-            if progress is not None and now - last_report > SECONDS_BETWEEN_REPORTS:
-                rate = (solver.point_steps - report_steps) / (now - report_time)
-                report_time, report_steps, last_report = now, solver.point_steps, now
-                progress(
-                    {
-                        "stage": "gush",
-                        "time": solver.time,
-                        "inflow_mass": inflow,
-                        "dt": (solver.time - begin) / count,
-                        "dt_limit": limit,
-                        "step": solver.step_count,
-                        "point_steps_per_second": rate,
-                    }
-                )
-        done = done or (stop.time is not None and solver.time >= stop.time * (1 - 1e-12))
-        snapshot = done or solver.time >= next_snapshot * (1 - 1e-12)
-        if snapshot:
-            next_snapshot = solver.time + (output.snapshot_interval or np.inf)
-        duration = solver.time - begin
-        limits.pop("output", None) if len(limits) > 1 else None
-        yield record(duration, duration / count, max(limits, key=limits.get), snapshot)
-        if done:
+    def _report(self, limit):
+        now, (last, point_steps) = clock.monotonic(), self._last_report
+        if self._progress is None or now - last <= SECONDS_BETWEEN_REPORTS:
             return
+        self._last_report = now, self.solver.point_steps
+        self._progress(
+            {
+                "stage": "gush",
+                "time": self.solver.time,
+                "inflow_mass": self._inflow,
+                "dt": (self.solver.time - self._begin) / sum(self._limits.values()),
+                "dt_limit": limit,
+                "step": self.solver.step_count,
+                "share": self._share(),
+                "point_steps_per_second": (self.solver.point_steps - point_steps) / (now - last),
+            }
+        )
+
+    def _share(self):
+        stop = self.scene.stop
+        pairs = ((self.solver.time, stop.time), (self._inflow, stop.inflow_mass))
+        return max(done / target for done, target in pairs if target is not None)

@@ -100,7 +100,7 @@ class Solver:
         self.initial = self.sums_over_points()
         self._spare = self.start.copy(), self.order.copy()
         self._moved = np.zeros(len(self.points), np.int32), np.zeros(len(self.points), np.int32)
-        self._longest_step, self._mode = math.inf, None
+        self.longest_step, self.mode = math.inf, None
         self._sort()
         self._update_wave_speed()
         # the projection of the initial pore pressure: hydrostatic, exact for linear functions
@@ -248,10 +248,10 @@ class Solver:
         self.wave_speed = max(speeds)
         if self.scene.numerics.critical_step == "spectral" and self.n_occupied:
             shortest = float(self.geometry[self.occupied[: self.n_occupied], 7].min())
-            certain = 0.5 * shortest / self.wave_speed if self._mode is None else 0.8 * self._longest_step
-            step, self._mode = spectral_time_step(self, certain, self._mode)
+            certain = 0.5 * shortest / self.wave_speed if self.mode is None else 0.8 * self.longest_step
+            step, self.mode = spectral_time_step(self, certain, self.mode)
             self.wave_speed = shortest / step
-            self._longest_step = step
+            self.longest_step = step
 
     # -- threads --------------------------------------------------------------------------------
 
@@ -287,7 +287,7 @@ class Solver:
         """Time step of the state at hand [s] and the name of what limits it."""
         if not self._mapped:
             self.map_points()
-        limits = [*self._limits, (self._longest_step, 0.0)]
+        limits = [*self._limits, (self.longest_step, 0.0)]
         return critical_time_step(limits, self.wave_speed, self.scene.numerics.courant)
 
     def points_by_name(self):
@@ -362,7 +362,7 @@ class Solver:
 
         if not self._mapped:
             self.map_points()
-        dt, limit = critical_time_step([*self._limits, (self._longest_step, 0.0)], self.wave_speed, numerics.courant)
+        dt, limit = critical_time_step([*self._limits, (self.longest_step, 0.0)], self.wave_speed, numerics.courant)
         if dt > dt_max:
             dt, limit = dt_max, "output"
         self.over_nodes(
@@ -435,17 +435,18 @@ class Solver:
         """
         rows = self.points[self.element_of_point >= 0]
         mass = rows[:, MASS]
-        momentum = mass @ rows[:, [VSX, VSY]]
-        kinetic = 0.5 * float(mass @ (rows[:, VSX] ** 2 + rows[:, VSY] ** 2))
+        # sums, no dot products: those of BLAS depend on its number of threads in the last bits
+        momentum = np.array([np.sum(mass * rows[:, VSX]), np.sum(mass * rows[:, VSY])])
+        kinetic = 0.5 * float(np.sum(mass * (rows[:, VSX] ** 2 + rows[:, VSY] ** 2)))
         water = 0.0
         if self.scene.water is not None:
             volume = self._volumes()[self.element_of_point >= 0]
             wet = self._water_density * rows[:, N] * volume
-            momentum = momentum + wet @ rows[:, [VLX, VLY]]
-            kinetic += 0.5 * float(wet @ (rows[:, VLX] ** 2 + rows[:, VLY] ** 2))
+            momentum += np.array([np.sum(wet * rows[:, VLX]), np.sum(wet * rows[:, VLY])])
+            kinetic += 0.5 * float(np.sum(wet * (rows[:, VLX] ** 2 + rows[:, VLY] ** 2)))
             water = float(wet.sum())
             if self._water_modulus > 0:
-                water += float(wet @ rows[:, P]) / self._water_modulus
+                water += float(np.sum(wet * rows[:, P])) / self._water_modulus
         return {"momentum": momentum, "kinetic": kinetic, "water": water}
 
     def balances(self):

@@ -39,15 +39,26 @@ def simulated(monkeypatch):
     """Replaces meshing and simulation by synthetic records; `ending` is what is raised after them."""
     state = SimpleNamespace(ending=None)
 
-    def simulate(scene, mesh, threads, progress):
-        for k in range(3):
-            progress({"stage": "gush", "time": 0.1 * k, "inflow_mass": 30.0 * k, "dt": 1e-4, "dt_limit": "acoustic",
-                      "point_steps_per_second": 5e6, "step": k})  # fmt: skip
-            yield record(0.1 * k, snapshot=k != 1)
-        if state.ending is not None:
-            raise state.ending
+    class Simulation:
+        def __init__(self, scene, mesh, threads, progress):
+            self.count, self.done, self.progress = 0, False, progress
 
-    monkeypatch.setitem(vars(mpm), "simulate", simulate)
+        def begin(self):
+            return self.advance(None)
+
+        def advance(self, pause):
+            k, self.count = self.count, self.count + 1
+            self.progress({"stage": "gush", "time": 0.1 * k, "inflow_mass": 30.0 * k, "dt": 1e-4, "step": k,
+                           "dt_limit": "acoustic", "point_steps_per_second": 5e6, "share": 0.3 * k})  # fmt: skip
+            if k == 3:
+                raise state.ending
+            self.done = k == 2 and state.ending is None
+            return record(0.1 * k, snapshot=k != 1)
+
+        def state(self):
+            return {"step_count": self.count}
+
+    monkeypatch.setitem(vars(mpm), "Simulation", Simulation)
     monkeypatch.setitem(vars(mpm), "build_mesh", lambda scene: Bare())
     return state
 
@@ -191,6 +202,7 @@ def test_ctrl_c_in_a_real_run_leaves_a_readable_file(tmp_path):
     process.send_signal(signal.SIGINT)
     message = process.communicate(timeout=60)[1].decode()
     assert process.returncode == 130, message
+    assert f"gush run --resume --out {tmp_path / 'a'}" in message
     assert datasets.read_attributes(tmp_path / "a")["status"] == "interrupted"
     assert datasets.read_pressures(tmp_path / "a").sizes["time"] >= 1
 
@@ -218,11 +230,11 @@ def test_plan_says_what_is_left_out_and_why(tmp_path):
 
 
 def test_progress_line_names_the_limit_and_the_time_left():
-    line = ProgressLine(make_quick_scene().mpm.stop)
+    line = ProgressLine()
     state = {"stage": "gush", "time": 0.1, "inflow_mass": 50.0, "dt": 1e-4, "dt_limit": "acoustic",
-             "point_steps_per_second": 8e6}  # fmt: skip
+             "point_steps_per_second": 8e6, "share": 0.25}  # fmt: skip
     line.text(state)
-    line._begin -= 10.0
+    line._begin = line._begin[0] - 10.0, 0.0  # ten seconds for this quarter
     text = line.text(state)
-    for part in ("t 0.100 s", "inflow 50 kg/m", "dt 100 µs (acoustic)", "8.0 M point-steps/s", "10 s left"):
+    for part in ("t 0.100 s", "inflow 50 kg/m", "dt 100 µs (acoustic)", "8.0 M point-steps/s", "30 s left"):
         assert part in text

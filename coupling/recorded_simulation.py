@@ -1,0 +1,201 @@
+"""A simulation written as it goes, with checkpoints, and stopped by Ctrl-C between two steps."""
+
+import errno
+import hashlib
+import logging
+import shlex
+import time as clock
+from datetime import UTC, datetime
+
+import numpy as np
+
+from coupling.checkpoint import remove_checkpoints, write_checkpoint
+from coupling.datasets import RunWriter, read_history, write_attributes
+from coupling.journal import replace_file
+from coupling.provenance import root_attributes
+from coupling.quality import quality, quality_attributes, quality_line
+from coupling.run_folder import MESH_FILE, RUN_FILE, SCENE_FILE, RunRefused
+from coupling.stop_signals import stop_signals
+
+MOST_TIME_FOR_CHECKPOINTS = 0.02  # share of the wall time that writing them may take
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+log = logging.getLogger("coupling.run")
+
+
+class RecordedSimulation:
+    """Runs a scene into a folder that is held, from the beginning or from what an earlier run left.
+
+    Parameters
+    ----------
+    scene : coupling.Scene
+    folder : path
+    report : callable
+        Called with progress dicts.
+    threads : int or None
+    checkpoint_interval : float
+        Wall time between checkpoints [s].
+    remains : coupling.resume.Remains or None
+        What to continue.
+    """
+
+    def __init__(self, scene, folder, report, threads, checkpoint_interval, remains=None):
+        self.scene, self.folder, self.report, self.threads = scene, folder, report, threads
+        self.checkpoint_interval, self.remains = checkpoint_interval, remains
+        self.attributes = root_attributes(scene)
+        self.writer = self.simulation = None
+        self._used_before = {"wall_seconds": 0.0, "cpu_seconds": 0.0}
+        self._begin = clock.monotonic(), clock.process_time()
+
+    def run(self):
+        """Simulate to the end; whatever stops it, what was computed stays readable and the run can be continued.
+
+        Raises
+        ------
+        RunFailed, KeyboardInterrupt, OSError, MemoryError
+            With a note that says how to go on.
+        """
+        import mpm
+
+        try:
+            self._prepare()
+            asked = self._advance()
+        except mpm.RunFailed as failure:
+            log.error("failed: %s", failure)
+            self._close("failed", str(failure))
+            failure.add_note(f"what was computed until then is in {self.folder}")
+            raise
+        except RunRefused:
+            raise
+        except (KeyboardInterrupt, OSError, MemoryError) as error:
+            reason = str(error) or type(error).__name__
+            log.warning("interrupted: %s", reason)
+            full = isinstance(error, OSError) and error.errno in FULL
+            room = f"make room on the disk of '{self.folder}', then " if full else ""
+            error.add_note(f"what was computed is kept; {room}continue with: {self._how_to_go_on()}")
+            self._close_if_possible(f"stopped by {reason}")
+            raise
+        except BaseException as error:
+            log.exception("failed")
+            self._close_if_possible(f"{type(error).__name__}: {error}", "failed")
+            raise
+        self._close("finished")
+        remove_checkpoints(self.folder)
+        log.info("finished in %.1f s", clock.monotonic() - self._begin[0])
+        if asked is not None:
+            interrupt = KeyboardInterrupt(asked)
+            interrupt.add_note(f"the simulation is finished; ring response and pictures: {self._how_to_go_on()}")
+            raise interrupt
+
+    def _prepare(self):
+        """Mesh, run file, and the simulation at its initial state or at its last checkpoint."""
+        import mpm
+
+        attributes, scene = self.attributes, self.scene
+        log.info("scene %s, %s, revision %s", scene.name, attributes["source"], attributes["revision"] or "unknown")
+        replace_file(self.folder / SCENE_FILE, attributes["scene"].encode())
+        self.report({"stage": "mesh"})
+        mesh = mpm.build_mesh(scene.mpm)
+        mesh.save(self.folder / MESH_FILE)
+        log.info("mesh: %s", ", ".join(f"{name} {value:.4g}" for name, value in mesh.quality.items()))
+        self.mesh_sha256 = mesh_sha256(mesh)
+        path, remains = self.folder / RUN_FILE, self.remains
+        state, about = (remains.state, remains.about) if remains is not None else (None, None)
+        if about is not None and about["mesh_sha256"] != self.mesh_sha256:
+            raise RunRefused(
+                f"run '{self.folder}': the mesher must give the mesh that the run began with, its hash was "
+                f"{about['mesh_sha256'][:12]} and is {self.mesh_sha256[:12]}; go back to the run's versions "
+                f"({remains.attributes['versions']}), or start a new run"
+            )
+        self.simulation = mpm.Simulation(scene.mpm, mesh, self.threads, self.report)
+        if remains is None or remains.attributes is None:
+            self.writer = RunWriter(path, attributes, scene.mpm, mesh)
+        else:
+            kept = {"records": 0, "snapshots": 0} if about is None else about
+            resumed = [
+                *filter(None, [remains.attributes.get("resumed")]),
+                datetime.now(UTC).isoformat(timespec="seconds"),
+            ]
+            self.writer = RunWriter.continued(
+                path, scene.mpm, kept["records"], kept["snapshots"], resumed=", ".join(resumed)
+            )
+        if about is None:
+            remove_checkpoints(self.folder)
+            self._append(self.simulation.begin())
+            self._store()
+        else:
+            self.simulation.restore(state)
+            self._used_before = {name: about[name] for name in self._used_before}
+            log.info("continued from step %d, t %.6g s", state["step_count"], state["time"])
+
+    def _advance(self):
+        simulation = self.simulation
+        cost, due = 0.0, clock.monotonic() + self.checkpoint_interval
+        with stop_signals() as stop:
+
+            def pause():
+                return stop.asked is not None or clock.monotonic() >= due
+
+            while not simulation.done:
+                record = simulation.advance(pause)
+                if record is not None:
+                    self._append(record)
+                if pause() and not simulation.done:
+                    begin = clock.monotonic()
+                    self._store()
+                    cost = clock.monotonic() - begin
+                    due = clock.monotonic() + max(self.checkpoint_interval, cost / MOST_TIME_FOR_CHECKPOINTS)
+                    if stop.asked is not None:
+                        raise KeyboardInterrupt(stop.asked)
+            return stop.asked
+
+    def _how_to_go_on(self):
+        return f"gush run --resume --out {shlex.quote(str(self.folder))}"
+
+    def _append(self, record):
+        self.writer.append(record)
+        log.info(
+            "t %.6g s  inflow %.6g kg/m  flow zone %.5g m2  dt %.3g s (%s)  steps %d",
+            *(record.time, record.inflow_mass, record.flow_zone_area, record.dt, record.dt_limit, record.steps),
+        )
+
+    def _store(self):
+        self.writer.flush()
+        about = {
+            **self.writer.written, **self._used(),
+            "scene_sha256": self.attributes["scene_sha256"], "mesh_sha256": self.mesh_sha256,
+        }  # fmt: skip
+        write_checkpoint(self.folder, self.simulation.state(), about)
+
+    def _used(self):
+        wall, cpu = self._begin
+        used = {"wall_seconds": clock.monotonic() - wall, "cpu_seconds": clock.process_time() - cpu}
+        return {name: value + self._used_before[name] for name, value in used.items()}
+
+    def _close(self, status, message=""):
+        if self.writer is not None:
+            self.writer.close(status, message, **self._used())
+            write_quality(self.folder / RUN_FILE)
+
+    def _close_if_possible(self, message, status="interrupted"):
+        try:
+            self._close(status, message)
+        except (OSError, MemoryError) as error:
+            log.warning("the end could not be written: %s", error)
+
+
+def write_quality(file, response=None):
+    """Store the quality line of a run with it."""
+    history = read_history(file)
+    if history.sizes["time"]:
+        values = quality(history, response)
+        write_attributes(file, **quality_attributes(values))
+        log.info("quality: %s", quality_line(values))
+
+
+def mesh_sha256(mesh):
+    """Hash of nodes, elements and regions of a mesh."""
+    digest = hashlib.sha256()
+    for array in (mesh.nodes, mesh.elements, mesh.region):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()

@@ -1,0 +1,115 @@
+"""A simulation continued from its state gives the bits of one that was never stopped."""
+
+import itertools
+
+import numpy as np
+import pytest
+from small_event import small_scene
+
+import mpm
+import mpm.solver
+from mpm.state import ARRAYS, NUMBERS
+
+#: Attributes of a solver that its state leaves out: built from scene and mesh, or by sorting the points.
+BUILT = {
+    "scene", "mesh", "soils", "parts", "geometry", "neighbours", "fixed", "contact_of_node", "n_contact", "normal",
+    "active", "friction", "lining", "threads", "initial_grain_mass", "initial", "_normal_open", "_active_open",
+    "_closed", "_pool", "_node_cuts", "_solve_nodes", "_advance_points", "_remap_nodes", "_rates", "_update",
+    "_relocate_points", "_water_density", "_water_modulus", "start", "order", "occupied", "n_occupied", "n_active",
+    "_element_cuts",
+}  # fmt: skip
+#: Written by each step before it is read.
+SCRATCH = {"momenta", "nodal_means", "status", "rates", "_spare", "_moved"}
+STATE = {*ARRAYS, *NUMBERS, "gate_open", "_mapped", "_limits", "mode"}
+
+
+@pytest.fixture(scope="module", params=["resolved", "sink", "spectral"])
+def scene(request):
+    if request.param == "spectral":
+        return small_scene(numerics={"critical_step": "spectral"}).mpm
+    return small_scene(interior=request.param).mpm
+
+
+@pytest.fixture(scope="module")
+def mesh(scene):
+    return mpm.build_mesh(scene)
+
+
+def copied(state):
+    return {name: value.copy() if isinstance(value, np.ndarray) else value for name, value in state.items()}
+
+
+@pytest.fixture(scope="module")
+def whole(scene, mesh):
+    """Records and last state of an uninterrupted simulation, and states on the way, some inside of intervals."""
+    simulation = mpm.Simulation(scene, mesh, threads=1)
+    records, states = [simulation.begin()], []
+    states.append((1, copied(simulation.state())))
+    steps = itertools.count(1)
+    while not simulation.done:
+        record = simulation.advance(lambda: next(steps) % 173 == 0)
+        if record is None:
+            states.append((len(records), copied(simulation.state())))
+        else:
+            records.append(record)
+    last = copied(simulation.state())
+    assert (last["removed_mass"] > 0) == (scene.interior == "sink")
+    return records, states, last
+
+
+def assert_same_bits(value, other, where=""):
+    if isinstance(value, dict):
+        assert value.keys() == other.keys(), where
+        for name in value:
+            assert_same_bits(value[name], other[name], f"{where}.{name}")
+    elif isinstance(value, list | tuple):
+        assert len(value) == len(other), where
+        for k, (a, b) in enumerate(zip(value, other, strict=True)):
+            assert_same_bits(a, b, f"{where}[{k}]")
+    elif isinstance(value, np.ndarray):
+        assert value.shape == other.shape and value.tobytes() == other.tobytes(), where
+    elif not where.endswith("cpu_seconds"):
+        assert value == other, where
+
+
+@pytest.mark.parametrize(("which", "threads"), [(0, 2), (2, 1), (-1, 2)])
+def test_continued_simulation_gives_the_bits_of_the_whole(scene, mesh, whole, which, threads, monkeypatch):
+    monkeypatch.setattr(mpm.solver, "SMALLEST_PARALLEL", 0)  # else a second thread would not be used
+    records, states, last = whole
+    count, state = states[which]
+    simulation = mpm.Simulation(scene, mesh, threads)
+    for name in SCRATCH - {"_spare", "_moved"}:
+        array = getattr(simulation.solver, name)
+        array[...] = np.nan if array.dtype.kind == "f" else 99
+    simulation.restore(state)
+    again = []
+    while not simulation.done:
+        again.append(simulation.advance())
+    assert_same_bits([vars(r) for r in records[count:]], [vars(r) for r in again], "records")
+    assert_same_bits(last, simulation.state(), "state")
+
+
+def test_every_attribute_of_the_solver_is_stored_built_or_scratch(scene, mesh):
+    # a new attribute that decides the future and is not stored would make resumed runs differ, perhaps rarely
+    simulation = mpm.Simulation(scene, mesh)
+    simulation.solver.map_points()
+    assert vars(simulation.solver).keys() == STATE | BUILT | SCRATCH
+    begun = vars(simulation).keys() - {"scene", "solver", "_progress", "_last_report"}
+    stored = {
+        "done",
+        "_cpu_begin",
+        "_interval",
+        "_inside",
+        "_begin",
+        "_limits",
+        "_next_snapshot",
+        "_inflow",
+        "_reached",
+    }
+    assert begun == stored
+
+
+def test_state_of_another_mesh_is_refused(scene, whole):
+    coarser = small_scene(discretisation={"element_size": 4.0}).mpm
+    with pytest.raises(ValueError, match="points must be"):
+        mpm.Simulation(coarser).restore(whole[1][0][1])
