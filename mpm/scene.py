@@ -194,14 +194,14 @@ class Numerics(Part):
         Mean volumetric strain rates over the elements around a node.
     critical_step : str
         Where the critical time step comes from: "altitude" of the elements over the wave speed, or "spectral", the
-        largest eigenvalue of the points on their mesh, renewed every 100 steps (`mpm.spectrum`).
+        largest eigenvalue of the points on their mesh, renewed every 200 steps (`mpm.spectrum`).
     """
 
-    courant: float = Field(default=0.5, gt=0, le=1)
+    courant: float = Field(default=0.8, gt=0, le=1)
     pic_rate: Annotated[float, in_unit("1/s")] = Field(default=10.0, ge=0)
-    pressure_filter: float = Field(default=0.2, ge=0, le=1)
+    pressure_filter: float = Field(default=0.4, ge=0, le=1)
     volumetric_smoothing: bool = True
-    critical_step: Literal["altitude", "spectral"] = "altitude"
+    critical_step: Literal["altitude", "spectral"] = "spectral"
     relaxation_tolerance: float = Field(default=1e-5, gt=0, lt=1)
     max_relaxation_steps: int = Field(default=20000, ge=1)
 

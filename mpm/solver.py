@@ -42,6 +42,7 @@ from mpm.variables import (
 
 PARTS = 2  # parts of the mesh that sum at the nodes on their own: fixed, so the bits do not depend on threads
 STEPS_BETWEEN_SORTS = 100
+STEPS_BETWEEN_SPECTRA = 2 * STEPS_BETWEEN_SORTS  # a spectrum costs about a dozen steps
 SMALLEST_PARALLEL = 4000  # elements; below it a second thread costs more than it brings
 
 
@@ -387,7 +388,8 @@ class Solver:
         self.point_steps += self.n_active
         if self.step_count % STEPS_BETWEEN_SORTS == 0:
             self._sort_physically()
-            self._update_wave_speed()
+            if self.step_count % STEPS_BETWEEN_SPECTRA == 0 or self.scene.numerics.critical_step == "altitude":
+                self._update_wave_speed()
         return dt, limit
 
     def _relocate(self):

@@ -35,7 +35,7 @@ class Spectrum:
     """
 
     def __init__(self, solver):
-        from scipy.sparse import csr_array, diags_array
+        from scipy.sparse import csr_array
 
         mesh, scene = solver.mesh, solver.scene
         inside = solver.element_of_point >= 0
@@ -48,9 +48,7 @@ class Spectrum:
         g = geometry[element]
         dx, dy = points[:, X] - g[:, 4], points[:, Y] - g[:, 5]
         n1, n2 = g[:, 0] * dx + g[:, 1] * dy, g[:, 2] * dx + g[:, 3] * dy
-        row = np.repeat(np.arange(len(points)), 3)
-        weights = np.column_stack([1 - n1 - n2, n1, n2]).ravel()
-        self.shape = csr_array((weights, (row, corners[element].ravel())), (len(points), n_nodes))
+        weights = np.column_stack([1 - n1 - n2, n1, n2])
         row, column = np.repeat(np.arange(n_elements), 3), corners.ravel()
         gx = np.column_stack([-geometry[:, 0] - geometry[:, 2], geometry[:, 0], geometry[:, 2]]).ravel()
         gy = np.column_stack([-geometry[:, 1] - geometry[:, 3], geometry[:, 1], geometry[:, 3]]).ravel()
@@ -61,24 +59,36 @@ class Spectrum:
         def total(values):
             return np.bincount(element, values, n_elements)
 
+        def at_nodes(values):
+            sums = [np.bincount(corners[element, i], values * weights[:, i], n_nodes) for i in range(3)]
+            return sums[0] + sums[1] + sums[2]
+
+        def consistent_mass(mass):
+            data = np.empty((n_elements, 3, 3))
+            for i in range(3):
+                for j in range(i, 3):
+                    data[:, i, j] = data[:, j, i] = total(mass * weights[:, i] * weights[:, j])
+            rows, columns = np.repeat(corners, 3, axis=1), np.tile(corners, (1, 3))
+            return csr_array((data.ravel(), (rows.ravel(), columns.ravel())), (n_nodes, n_nodes))
+
         own = volume * (soil[:, S_SIN_DIL] > 0.0)
         self.own = np.divide(total(own), total(volume))  # share that takes its element's own rates
         self.lam, self.shear = total(volume * soil[:, S_LAMBDA]), total(volume * soil[:, S_G])
         self.wet = scene.water is not None
-        self.mass, self.mass_solid = mass, self.shape.T @ mass
+        self.through_solid, self.mass_solid = self._through(consistent_mass(mass))
         if self.wet:
             water = volume * solver._water_density
             self.q_solid = total(volume * solver._water_modulus * (1 - porosity) / porosity)
             self.q_liquid = total(volume * solver._water_modulus)
-            self.water, self.mass_liquid = water, self.shape.T @ water
-            self.mass_pore = self.shape.T @ (porosity * water)
-            self.drag = self.shape.T @ (porosity * soil[:, S_DRAG] * water)
-        self.mean = None
-        if scene.numerics.volumetric_smoothing:
-            to_nodes = csr_array((np.ones(3 * n_elements), (column, row)), (n_nodes, n_elements))
-            sums = to_nodes @ total(volume)
-            inverse = np.divide(1.0, sums, out=np.zeros(n_nodes), where=sums > 0)
-            self.mean = (to_nodes.T / 3) @ diags_array(inverse) @ to_nodes @ diags_array(total(volume))
+            self.through_liquid, self.mass_liquid = self._through(consistent_mass(water))
+            self.mass_pore = at_nodes(porosity * water)
+            self.drag = at_nodes(porosity * soil[:, S_DRAG] * water)
+        self.smoothing = scene.numerics.volumetric_smoothing
+        if self.smoothing:
+            self.to_nodes = csr_array((np.ones(3 * n_elements), (column, row)), (n_nodes, n_elements))
+            self.volume = total(volume)
+            sums = self.to_nodes @ self.volume
+            self.per_volume = np.divide(1.0, sums, out=np.zeros(n_nodes), where=sums > 0)
         self.free_x = (self.mass_solid > 0) & ((solver.fixed & FIXED_X) == 0)
         self.free_y = (self.mass_solid > 0) & ((solver.fixed & FIXED_Y) == 0)
 
@@ -88,16 +98,14 @@ class Spectrum:
         xx, yy = self.gx @ solid[0], self.gy @ solid[1]
         xy = 0.5 * (self.gy @ solid[0] + self.gx @ solid[1])
         own = xx + yy
-        volume = own if self.mean is None else self.mean @ own
+        volume = self._mean(own)
         skeleton = volume + self.own * (own - volume)
         correction = 0.5 * (skeleton - own)
         sxx = self.lam * skeleton + 2 * self.shear * (xx + correction)
         syy = self.lam * skeleton + 2 * self.shear * (yy + correction)
         sxy = 2 * self.shear * xy
         if self.wet:
-            liquid = self.gx @ velocity[2] + self.gy @ velocity[3]
-            if self.mean is not None:
-                liquid = self.mean @ liquid
+            liquid = self._mean(self.gx @ velocity[2] + self.gy @ velocity[3])
             pressure = -(self.q_solid * volume + self.q_liquid * liquid)
             sxx, syy = sxx - pressure, syy - pressure
         force = -(self.gx.T @ sxx + self.gy.T @ sxy), -(self.gx.T @ sxy + self.gy.T @ syy)
@@ -108,34 +116,48 @@ class Spectrum:
                 push = (gradient.T @ pressure)[free]
                 pair = free_pair.py_func(force[k][free], push, ms, ml, mn, 0.5 * dt * self.drag[free])
                 result[k, free], result[k + 2, free] = pair
-                result[k + 2] = self._through_points(result[k + 2], self.water, self.mass_liquid, free)
+                result[k + 2] = np.where(free, self.through_liquid @ result[k + 2], 0.0)
             else:
                 result[k, free] = force[k][free] / self.mass_solid[free]
-            result[k] = self._through_points(result[k], self.mass, self.mass_solid, free)
+            result[k] = np.where(free, self.through_solid @ result[k], 0.0)
         return result
 
-    def _through_points(self, values, mass, nodal_mass, free):
-        back = np.zeros_like(values)
-        back[free] = (self.shape.T @ (mass * (self.shape @ values)))[free] / nodal_mass[free]
-        return back
+    def _mean(self, rates):
+        """Mean over the elements around each element's corners, weighted with the volume in them."""
+        if not self.smoothing:
+            return rates
+        nodal = self.per_volume * (self.to_nodes @ (self.volume * rates))
+        return self.to_nodes.T @ nodal / 3
+
+    @staticmethod
+    def _through(consistent):
+        """From nodal velocities to the points and back, (n_nodes, n_nodes), and the nodal mass [kg/m]."""
+        mass = consistent.sum(axis=1)
+        inverse = np.divide(1.0, mass, out=np.zeros_like(mass), where=mass > 0)
+        consistent.data *= np.repeat(inverse, np.diff(consistent.indptr))
+        return consistent, mass
 
     def largest(self, dt, start=None):
         """Largest eigenvalue [1/s2] with drag over dt [s], and its mode; start: a guess of the mode."""
         from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
+        from threadpoolctl import threadpool_limits
 
         shape = (4 if self.wet else 2, len(self.mass_solid))
         size = shape[0] * shape[1]
         operator = LinearOperator(
             (size, size), matvec=lambda u: -self.accelerations(u.reshape(shape), dt).ravel(), dtype=float
         )
-        if start is None:
+        if start is None or not operator.matvec(start).any():  # points have left the nodes of an earlier mode
             start = np.random.default_rng(0).standard_normal(size)
+            if not operator.matvec(start).any():
+                return 0.0, None
         try:
-            values, modes = eigs(operator, k=1, which="LM", v0=start, ncv=min(16, size), tol=TOLERANCE, maxiter=40)
+            # one thread: the bits must not depend on how many there are, and small products gain nothing from more
+            with threadpool_limits(1, user_api="blas"):
+                values, modes = eigs(operator, k=1, which="LM", v0=start, ncv=min(16, size), tol=TOLERANCE, maxiter=40)
         except ArpackNoConvergence:
             return math.inf, None
-        # three digits, upwards: the last ones depend on the threads of BLAS
-        return float(f"{1.005 * np.abs(values[0]):.2e}"), np.real(modes[:, 0])
+        return float(np.abs(values[0])), np.real(modes[:, 0])
 
 
 def spectral_time_step(solver, shortest, start=None):

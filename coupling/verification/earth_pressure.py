@@ -67,7 +67,7 @@ def wall(
 
 def active_wall(
     cells=10, width=2.0, strain=4e-4, friction_angle=30.0, dilatancy_angle=0.0, cohesion=0.0, rough_base=False,
-    duration=0.5, points=3, courant=0.5, pic_rate=10.0, smoothing=True,
+    duration=0.5, points=3, courant=0.8, pic_rate=10.0, smoothing=True,
 ):  # fmt: skip
     """Active thrust."""
     return wall(
@@ -78,7 +78,7 @@ def active_wall(
 
 def passive_wall(
     cells=10, width=2.0, strain=1.5e-3, friction_angle=30.0, dilatancy_angle=0.0, cohesion=0.0, rough_base=False,
-    duration=0.5, points=3, courant=0.5, pic_rate=10.0, smoothing=True,
+    duration=0.5, points=3, courant=0.8, pic_rate=10.0, smoothing=True,
 ):  # fmt: skip
     """Passive resistance."""
     return wall(
@@ -96,7 +96,7 @@ def bearing_capacity_factor(friction_angle):
 
 
 def footing(
-    cells=8, friction_angle=0.0, rough=True, settlement=0.0025, stiffness=20000.0, duration=0.25, points=3, courant=0.5,
+    cells=8, friction_angle=0.0, rough=True, settlement=0.0025, stiffness=20000.0, duration=0.25, points=3, courant=0.8,
     pic_rate=10.0, smoothing=True,
 ):  # fmt: skip
     """Press half a strip footing into weightless soil: `cells` elements, 1 m, and half an element.
@@ -134,7 +134,7 @@ def footing(
 
 
 WALL_LADDER = {
-    "cells": (5, 10, 20), "courant": (0.25, 0.5, 0.9), "points": (1, 3, 12), "pic_rate": (0.0, 10.0, 100.0),
+    "cells": (5, 10, 20), "courant": (0.4, 0.8, 1.0), "points": (1, 3, 12), "pic_rate": (0.0, 10.0, 100.0),
     "smoothing": (False, True), "friction_angle": (20.0, 30.0, 40.0), "dilatancy_angle": (0.0, 10.0, 30.0),
     "cohesion": (0.0, 2e3), "rough_base": (False, True),
 }  # fmt: skip
@@ -159,7 +159,7 @@ register(Problem(
     source="Prandtl (1920): N_c = 2 + pi", norm="N_c over 2 + pi less 1, mean over the last fifth of the path",
     solve=footing, fast={"cells": 8},
     ladder={
-        "cells": (2, 4, 8, 16), "courant": (0.25, 0.5, 0.9), "points": (1, 3, 12), "pic_rate": (0.0, 10.0, 100.0),
+        "cells": (2, 4, 8, 16), "courant": (0.4, 0.8, 1.0), "points": (1, 3, 12), "pic_rate": (0.0, 10.0, 100.0),
         "smoothing": (False, True), "rough": (False, True),
         "friction_angle": (0.0, 10.0, 20.0), "stiffness": (10000.0, 20000.0, 40000.0),
     },
