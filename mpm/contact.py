@@ -75,24 +75,48 @@ def wall_normal(b_s, b_l, ms, ml, mn, d, dt):
 
 
 @kernel
+def stop_rows(i, next_row, nodes, mean):
+    """No velocity at a node without mass, on none of its rows."""
+    n_nodes = nodes.shape[0] - mean.shape[0]
+    r = i
+    while r >= 0:
+        row = nodes[r]
+        row[V_SX] = row[V_SY] = row[V_LX] = row[V_LY] = 0.0
+        row[V_DSX] = row[V_DSY] = row[V_DLX] = row[V_DLY] = 0.0
+        if r >= n_nodes:
+            mean[r - n_nodes] = 0.0
+        r = next_row[r]
+
+
+@kernel
 def solve_nodes(
-    first, last, sums, dt, gravity, density_liquid, fixed, contact_of_node,
-    normal, active, friction, nodes, status, impulse, ledger,
+    first, last, which, next_row, level_of_row, begun, dt_of_level, sums, mean, gravity, density_liquid, fixed,
+    contact_of_node, normal, active, friction, nodes, status, impulse, ledger,
 ):  # fmt: skip
-    """Add up the parts of a range of nodes and advance both phases by dt.
+    """Add up the parts of a range of nodes and advance both phases by the time step of each node's finest level.
 
     Parameters
     ----------
-    sums : (n_parts, n_nodes, 13) float64
-        What the parts of the mesh add to the nodes; added in the order of the parts.
+    which : (n_nodes,) int32
+        The nodes, by their finest level; next_row, level_of_row : (n_rows,), of :class:`mpm.levels.Levels`.
+    begun : int
+        Levels up to this one begin a step now.
+    dt_of_level : (n_levels,) float64
+        [s]
+    sums : (n_parts, n_rows, 13) float64
+        What the parts of the mesh add to the rows; added in the order of the parts. Written: momenta of rows tied to
+        a finer one, which follow the node.
+    mean : (n_rows - n_nodes, 6) float64
+        Of rows tied to a finer one: mean over their step so far of the velocity of the grains, and of the remapped
+        velocities of both phases.
     fixed, status : (n_nodes,) int8
         Box boundary bits; written: which constraints acted.
     contact_of_node : (n_nodes,) int32
         Row of the contact arrays or -1.
     normal, active, friction : (n_contact, 2), (n_contact,), (n_contact,)
         Into the material; whether the wall is there; Coulomb coefficient [-].
-    nodes : (n_nodes, 13) float64
-        Written: new velocities, increments, masses, pressure projection.
+    nodes : (n_rows, 16) float64
+        Written: new velocities, increments (over their whole step for tied rows), masses, pressure projection.
     impulse : (n_contact, 5) float64
         Added: dt times effective normal, water normal, tangential reaction [N s/m], the latter along
         (ny, -nx) on the material, and dt times the squares of the first two.
@@ -100,34 +124,43 @@ def solve_nodes(
         Added: see :data:`mpm.variables.LEDGER`.
     """
     px = py = kinetic = by_gravity = by_drag = by_stress = unfelt = reactions = 0.0
-    for i in range(first, last):
-        ms = ml = mn = dd = psx = psy = plx = ply = q = fx = fy = flx = fly = 0.0
-        for part in range(sums.shape[0]):
-            b = sums[part, i]
-            ms += b[B_MS]
-            ml += b[B_ML]
-            mn += b[B_MN]
-            dd += b[B_D]
-            psx += b[B_PSX]
-            psy += b[B_PSY]
-            plx += b[B_PLX]
-            ply += b[B_PLY]
-            q += b[B_Q]
-            fx += b[B_FX]
-            fy += b[B_FY]
-            flx += b[B_FLX]
-            fly += b[B_FLY]
+    n_nodes = nodes.shape[0] - mean.shape[0]
+    for k in range(first, last):
+        i = which[k]
+        dt = dt_of_level[level_of_row[i]]
+        ms = ml = mn = dd = psx = psy = plx = ply = fx = fy = flx = fly = 0.0
+        r = i
+        while r >= 0:
+            ml_row = q = 0.0
+            for part in range(sums.shape[0]):
+                b = sums[part, r]
+                ms += b[B_MS]
+                ml_row += b[B_ML]
+                mn += b[B_MN]
+                dd += b[B_D]
+                psx += b[B_PSX]
+                psy += b[B_PSY]
+                plx += b[B_PLX]
+                ply += b[B_PLY]
+                q += b[B_Q]
+                fx += b[B_FX]
+                fy += b[B_FY]
+                flx += b[B_FLX]
+                fly += b[B_FLY]
+            ml += ml_row
+            if ml_row <= 0.0:
+                nodes[r, V_P] = 0.0
+            elif level_of_row[r] <= begun:
+                nodes[r, V_P] += q * density_liquid / ml_row
+            r = next_row[r]
         row = nodes[i]
         row[V_MS] = ms
         row[V_ML] = ml
         status[i] = 0
         if ms <= 0.0 or ml <= 0.0:
             row[V_MS] = 0.0
-            row[V_P] = 0.0
-            row[V_SX] = row[V_SY] = row[V_LX] = row[V_LY] = 0.0
-            row[V_DSX] = row[V_DSY] = row[V_DLX] = row[V_DLY] = 0.0
+            stop_rows(i, next_row, nodes, mean)
             continue
-        row[V_P] += q * density_liquid / ml
         grid_x, grid_y, water_x, water_y = fx, fy, flx, fly  # of stresses alone
         fy -= (ms + mn) * gravity
         fly -= ml * gravity
@@ -180,6 +213,27 @@ def solve_nodes(
         row[V_SX], row[V_SY], row[V_LX], row[V_LY] = vsx, vsy, vlx, vly
         row[V_DSX], row[V_DSY] = vsx - ux, vsy - uy
         row[V_DLX], row[V_DLY] = vlx - wx, vly - wy
+        r = next_row[i]
+        while r >= 0:
+            other, sofar = nodes[r], mean[r - n_nodes]
+            if level_of_row[r] <= begun:
+                sofar[:] = 0.0
+                other[V_DSX] = other[V_DSY] = other[V_DLX] = other[V_DLY] = 0.0
+            share = dt / dt_of_level[level_of_row[r]]
+            sofar[0] += share * vsx
+            sofar[1] += share * vsy
+            other[V_SX], other[V_SY], other[V_LX], other[V_LY] = vsx, vsy, vlx, vly
+            other[V_DSX] += vsx - ux
+            other[V_DSY] += vsy - uy
+            other[V_DLX] += vlx - wx
+            other[V_DLY] += vly - wy
+            for part in range(sums.shape[0]):
+                b = sums[part, r]
+                b[B_PSX] += b[B_MS] * (vsx - ux)
+                b[B_PSY] += b[B_MS] * (vsy - uy)
+                b[B_PLX] += b[B_ML] * (vlx - wx)
+                b[B_PLY] += b[B_ML] * (vly - wy)
+            r = next_row[r]
         # mean velocities of the step: with them work is the change of kinetic energy, whatever the time step
         sx, sy, lx, ly = 0.5 * (ux + vsx), 0.5 * (uy + vsy), 0.5 * (wx + vlx), 0.5 * (wy + vly)
         share = mn / ml
@@ -202,26 +256,32 @@ def solve_nodes(
 
 @kernel
 def solve_dry_nodes(
-    first, last, sums, dt, gravity, density_liquid, fixed, contact_of_node,
-    normal, active, friction, nodes, status, impulse, ledger,
+    first, last, which, next_row, level_of_row, begun, dt_of_level, sums, mean, gravity, density_liquid, fixed,
+    contact_of_node, normal, active, friction, nodes, status, impulse, ledger,
 ):  # fmt: skip
     """`solve_nodes` for dry soil: one momentum equation a node; the water's columns are not touched."""
     sum_x = sum_y = kinetic = by_gravity = by_stress = unfelt = reactions = 0.0
-    for i in range(first, last):
+    n_nodes = nodes.shape[0] - mean.shape[0]
+    for k in range(first, last):
+        i = which[k]
+        dt = dt_of_level[level_of_row[i]]
         ms = px = py = fx = fy = 0.0
-        for part in range(sums.shape[0]):
-            b = sums[part, i]
-            ms += b[B_MS]
-            px += b[B_PSX]
-            py += b[B_PSY]
-            fx += b[B_FX]
-            fy += b[B_FY]
+        r = i
+        while r >= 0:
+            for part in range(sums.shape[0]):
+                b = sums[part, r]
+                ms += b[B_MS]
+                px += b[B_PSX]
+                py += b[B_PSY]
+                fx += b[B_FX]
+                fy += b[B_FY]
+            r = next_row[r]
         row = nodes[i]
         row[V_MS] = ms
         status[i] = 0
         if ms <= 0.0:
             row[V_MS] = 0.0
-            row[V_SX] = row[V_SY] = row[V_DSX] = row[V_DSY] = 0.0
+            stop_rows(i, next_row, nodes, mean)
             continue
         ux, uy = px / ms, py / ms
         px += dt * fx
@@ -257,6 +317,23 @@ def solve_dry_nodes(
             vy = 0.0
         row[V_SX], row[V_SY] = vx, vy
         row[V_DSX], row[V_DSY] = vx - ux, vy - uy
+        r = next_row[i]
+        while r >= 0:
+            other, sofar = nodes[r], mean[r - n_nodes]
+            if level_of_row[r] <= begun:
+                sofar[:] = 0.0
+                other[V_DSX] = other[V_DSY] = 0.0
+            share = dt / dt_of_level[level_of_row[r]]
+            sofar[0] += share * vx
+            sofar[1] += share * vy
+            other[V_SX], other[V_SY] = vx, vy
+            other[V_DSX] += vx - ux
+            other[V_DSY] += vy - uy
+            for part in range(sums.shape[0]):
+                b = sums[part, r]
+                b[B_PSX] += b[B_MS] * (vx - ux)
+                b[B_PSY] += b[B_MS] * (vy - uy)
+            r = next_row[r]
         sx, sy = 0.5 * (ux + vx), 0.5 * (uy + vy)
         sum_x += ms * (vx - ux)
         sum_y += ms * (vy - uy)
@@ -277,19 +354,39 @@ def remap_kernel(wet):
     """Kernel `remap_nodes` for points with pore water or without."""
 
     @kernel
-    def remap_nodes(first, last, momenta, fixed, contact_of_node, normal, active, nodes, status):
-        """Nodal velocities from the updated point momenta (MUSL), under the constraints that acted in this step."""
-        for i in range(first, last):
+    def remap_nodes(
+        first, last, which, next_row, level_of_row, finished, dt_of_level, momenta, sums, mean, fixed, contact_of_node,
+        normal, active, nodes, status,
+    ):  # fmt: skip
+        """Nodal velocities from the updated point momenta (MUSL), under the constraints that acted in this step.
+
+        Rows of levels up to `finished` have new momenta; the others keep the node's, which `solve_nodes` has followed
+        in `sums`, and their own velocities become the mean over their step when it ends.
+        """
+        n_nodes = nodes.shape[0] - mean.shape[0]
+        for k in range(first, last):
+            i = which[k]
             row = nodes[i]
             if row[V_MS] <= 0.0:
                 continue
             sx = sy = lx = ly = 0.0
-            for part in range(momenta.shape[0]):
-                sx += momenta[part, i, 0]
-                sy += momenta[part, i, 1]
-                if wet:
-                    lx += momenta[part, i, 2]
-                    ly += momenta[part, i, 3]
+            r = i
+            while r >= 0:
+                done = level_of_row[r] <= finished
+                for part in range(momenta.shape[0]):
+                    if done:
+                        sx += momenta[part, r, 0]
+                        sy += momenta[part, r, 1]
+                        if wet:
+                            lx += momenta[part, r, 2]
+                            ly += momenta[part, r, 3]
+                    else:
+                        sx += sums[part, r, B_PSX]
+                        sy += sums[part, r, B_PSY]
+                        if wet:
+                            lx += sums[part, r, B_PLX]
+                            ly += sums[part, r, B_PLY]
+                r = next_row[r]
             sx /= row[V_MS]
             sy /= row[V_MS]
             if wet:
@@ -317,20 +414,37 @@ def remap_kernel(wet):
             row[V_SX], row[V_SY] = sx, sy
             if wet:
                 row[V_LX], row[V_LY] = lx, ly
+            r = next_row[i]
+            while r >= 0:
+                other, sofar = nodes[r], mean[r - n_nodes]
+                share = dt_of_level[level_of_row[i]] / dt_of_level[level_of_row[r]]
+                sofar[2] += share * sx
+                sofar[3] += share * sy
+                sofar[4] += share * lx
+                sofar[5] += share * ly
+                if level_of_row[r] <= finished:
+                    other[V_SX], other[V_SY], other[V_LX], other[V_LY] = sofar[2], sofar[3], sofar[4], sofar[5]
+                r = next_row[r]
 
     return remap_nodes
 
 
 @kernel
-def smooth_rates(first, last, sums, nodes):
+def smooth_rates(first, last, which, means, momenta, sums, nodes):
     """Nodal means of the divergences and of the gradient of the projected pressure (Detournay & Dzik 2006).
 
-    sums : (n_parts, n_nodes, 7) float64, of `element_rates`. A node without weight keeps what it had.
+    Within a level. What the step has read of these rows is cleared for what comes next.
+
+    which : (n_rows,) int32
+        The rows, by level.
+    means : (n_parts, n_rows, 7) float64, of `element_rates`. A row without weight keeps what it had.
+    momenta, sums : (n_parts, n_rows, 4), (n_parts, n_rows, 13) float64
     """
-    for i in range(first, last):
+    for k in range(first, last):
+        i = which[k]
         volume = ts = wet = ws = wl = gx = gy = 0.0
-        for part in range(sums.shape[0]):
-            row = sums[part, i]
+        for part in range(means.shape[0]):
+            row = means[part, i]
             volume += row[0]
             ts += row[1]
             wet += row[2]
@@ -338,6 +452,9 @@ def smooth_rates(first, last, sums, nodes):
             wl += row[4]
             gx += row[5]
             gy += row[6]
+            row[:] = 0.0
+            momenta[part, i] = 0.0
+            sums[part, i] = 0.0
         if volume > 0.0:
             nodes[i, V_TS] = ts / volume
         if wet > 0.0:

@@ -167,6 +167,38 @@ def sort_by_element(element_of_point, n_elements, start, order, occupied):
 
 
 @kernel
+def cut_by_points(start, occupied, n_occupied, element_cuts, parts, smallest):
+    """Cut the occupied elements of all levels up to each one into parts of about as many points.
+
+    Parameters
+    ----------
+    element_cuts : (n_levels + 1,) int
+        First element of each level.
+    parts, smallest : int
+        Fewer points than `smallest` stay in one part: the others are empty.
+
+    Returns
+    -------
+    cuts : (n_levels, parts + 1) int64
+        Places in the list of occupied elements.
+    points : (n_levels,) int64
+    """
+    n_levels = element_cuts.size - 1
+    cuts, points = np.zeros((n_levels, parts + 1), np.int64), np.zeros(n_levels, np.int64)
+    held = occupied[:n_occupied]
+    for level in range(n_levels):
+        edge = element_cuts[level + 1]
+        end = np.searchsorted(held, edge)
+        points[level] = start[edge]
+        for part in range(1, parts + 1):
+            cuts[level, part] = end
+            if part < parts and start[edge] >= smallest:
+                element = np.searchsorted(start, part * start[edge] // parts, side="right") - 1
+                cuts[level, part] = np.searchsorted(held, element)
+    return cuts, points
+
+
+@kernel
 def update_order(element_of_point, moved_point, moved_from, n_moved, start, order, occupied, new_start, new_order):
     """Repair the sorting by element after a few points have moved, copying what lies between them.
 
@@ -241,20 +273,21 @@ def update_order(element_of_point, moved_point, moved_from, n_moved, start, orde
 
 
 @cache
-def relocate_kernel(wet):
-    """Kernel `relocate` for points with pore water or without."""
-    map_point = map_kernel(wet)
+def relocate_kernel(wet, tied):
+    """Kernel `relocate` for points with pore water or without, on levels tied to each other or on one."""
+    map_point = map_kernel(wet, tied)
 
     @kernel
     def relocate(
-        element_of_point, points, soil_of_point, soils, density_liquid, elements, geometry, neighbours, nodes,
-        wave_speed, volume, sums, clamps, moved_point, moved_from,
+        element_of_point, points, soil_of_point, soils, density_liquid, rows, geometry, neighbours, nodes,
+        wave_speed, volume, level_of_element, finished, sums, clamps, moved_point, moved_from,
     ):  # fmt: skip
         """Find the new element of every point that left its own, walking over neighbours, and map it there.
 
         A point that would cross the boundary of the mesh is put back on it (and counted); one that
-        crosses an outflow edge (neighbour -2) is taken out: element -1. The points that changed their
-        element and the elements that they left are written to `moved_point`, `moved_from` in ascending
+        crosses an outflow edge (neighbour -2) is taken out: element -1. A point on its way to an element of a
+        level above `finished`, whose step is not over, waits in its own as if on the edge. The points that changed
+        their element and the elements that they left are written to `moved_point`, `moved_from` in ascending
         order of points.
 
         Returns
@@ -314,6 +347,8 @@ def relocate_kernel(wet):
                 points[i, Y] = g[5] + (n2 * g[0] - n1 * g[2]) / det
                 clamps[C_RETURNED] += 1
                 break
+            if tied and e >= 0 and level_of_element[e] > finished:
+                e = left
             element_of_point[i] = e
             if e != left:
                 moved_point[n_moved] = i
@@ -321,13 +356,13 @@ def relocate_kernel(wet):
                 n_moved += 1
             if e >= 0:
                 added, fastest = map_point(
-                    points[i], soils[soil_of_point[i]], density_liquid, elements[e], geometry[e], nodes, sums
+                    points[i], soils[soil_of_point[i]], density_liquid, rows[e], geometry[e], nodes, sums
                 )
                 volume[e, 0] += added
                 if points[i, P] > 0.0:
                     volume[e, 1] += added
                 fastest = np.sqrt(fastest)
-                local = geometry[e, 7] / (wave_speed + fastest)
+                local = geometry[e, 7] / ((wave_speed + fastest) * (1 << level_of_element[e]))
                 if local < limit:
                     limit = local
                     limit_speed = fastest

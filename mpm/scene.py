@@ -194,7 +194,9 @@ class Numerics(Part):
         Mean volumetric strain rates over the elements around a node.
     critical_step : str
         Where the critical time step comes from: "altitude" of the elements over the wave speed, or "spectral", the
-        largest eigenvalue of the points on their mesh, renewed every 200 steps (`mpm.spectrum`).
+        largest eigenvalue of the points on their mesh, renewed now and then (`mpm.spectrum`).
+    local_time_stepping : bool
+        Groups of elements take steps of their own, powers of two times the smallest (`mpm.levels`).
     """
 
     courant: float = Field(default=0.8, gt=0, le=1)
@@ -202,6 +204,7 @@ class Numerics(Part):
     pressure_filter: float = Field(default=0.4, ge=0, le=1)
     volumetric_smoothing: bool = True
     critical_step: Literal["altitude", "spectral"] = "spectral"
+    local_time_stepping: bool = True
     relaxation_tolerance: float = Field(default=1e-5, gt=0, lt=1)
     max_relaxation_steps: int = Field(default=20000, ge=1)
 

@@ -19,9 +19,9 @@ SECONDS_BETWEEN_REPORTS = 0.25
 class Record:
     """What happened in one output interval: means over it, and the state at its end.
 
-    Pressures [Pa], compression positive; `lining` has one dict a tunnel with theta [degrees from the
-    crown, clockwise], arc [m], soil_pressure (effective), water_pressure, soil_shear (clockwise
-    traction on the lining) and the standard deviation of the first two within the interval.
+    `dt` and `steps` are those of the smallest elements. Pressures [Pa], compression positive; `lining` has one dict a
+    tunnel with theta [degrees from the crown, clockwise], arc [m], soil_pressure (effective), water_pressure,
+    soil_shear (clockwise traction on the lining) and the standard deviation of the first two within the interval.
     `balances` are those of :meth:`mpm.Solver.balances`.
     """
 
@@ -81,9 +81,9 @@ class Simulation:
         self._cpu_begin = clock.process_time()
         self._interval, self._inside = 0, False  # number of the interval at hand; whether it has begun
         self._reached = False  # whether the last interval is at hand
-        self._begin, self._limits = 0.0, {}
+        self._begin, self._begin_substeps, self._limits = 0.0, 0, {}
         self._next_snapshot = scene.output.snapshot_interval or np.inf
-        self._inflow = 0.0
+        self._inflow, self._checked = 0.0, 0  # kg/m, and when
         self._progress = progress
         self._last_report = clock.monotonic(), 0
 
@@ -130,7 +130,7 @@ class Simulation:
         solver, stop, output = self.solver, self.scene.stop, self.scene.output
         if not self._inside:
             self._interval += 1
-            self._begin, self._limits, self._inside = solver.time, {}, True
+            self._begin, self._begin_substeps, self._limits, self._inside = solver.time, solver.step_count, {}, True
             solver.impulse[:] = 0.0
         end = self._interval * output.interval
         if stop.time is not None:
@@ -138,7 +138,8 @@ class Simulation:
         while solver.time < end * (1 - 1e-12) and not self._reached:
             _, limit = solver.step(end - solver.time)
             self._limits[limit] = self._limits.get(limit, 0) + 1
-            if solver.step_count % STEPS_BETWEEN_CHECKS == 0:
+            if solver.step_count - self._checked >= STEPS_BETWEEN_CHECKS:
+                self._checked = solver.step_count
                 self._inflow = solver.inflow_mass()
                 self._reached = stop.inflow_mass is not None and self._inflow >= stop.inflow_mass
             self._report(limit)
@@ -149,7 +150,7 @@ class Simulation:
         if snapshot:
             self._next_snapshot = solver.time + (output.snapshot_interval or np.inf)
         self._inside = False
-        duration, count = solver.time - self._begin, sum(self._limits.values())
+        duration, count = solver.time - self._begin, solver.step_count - self._begin_substeps
         limits = {name: steps for name, steps in self._limits.items() if name != "output"} or self._limits
         return self._record(duration, duration / count, max(limits, key=limits.get), snapshot)
 
@@ -166,9 +167,11 @@ class Simulation:
             "interval": self._interval,
             "inside_interval": self._inside,
             "interval_begin": self._begin,
+            "interval_begin_substeps": self._begin_substeps,
             "interval_limits": json.dumps(self._limits),  # in the order met, which decides between equals
             "next_snapshot": self._next_snapshot,
             "inflow_mass": self._inflow,
+            "checked": self._checked,
             "reached": self._reached,
             "done": self.done,
             "cpu_seconds": self.cpu_seconds,
@@ -185,7 +188,9 @@ class Simulation:
         restore_solver(self.solver, state)
         self._interval, self._inside = int(state["interval"]), bool(state["inside_interval"])
         self._begin, self._limits = float(state["interval_begin"]), json.loads(state["interval_limits"])
+        self._begin_substeps = int(state["interval_begin_substeps"])
         self._next_snapshot, self._inflow = float(state["next_snapshot"]), float(state["inflow_mass"])
+        self._checked = int(state["checked"])
         self._reached, self.done = bool(state["reached"]), bool(state["done"])
         self._cpu_begin = clock.process_time() - float(state["cpu_seconds"])
         self._last_report = clock.monotonic(), self.solver.point_steps
@@ -221,7 +226,7 @@ class Simulation:
                 "stage": "gush",
                 "time": self.solver.time,
                 "inflow_mass": self._inflow,
-                "dt": (self.solver.time - self._begin) / sum(self._limits.values()),
+                "dt": (self.solver.time - self._begin) / (self.solver.step_count - self._begin_substeps),
                 "dt_limit": limit,
                 "step": self.solver.step_count,
                 "share": self._share(),

@@ -9,7 +9,8 @@ import numpy as np
 
 from mpm import stages
 from mpm.contact import FIXED_X, FIXED_Y, remap_kernel, smooth_rates, solve_dry_nodes, solve_nodes
-from mpm.points import fill, initial_stress, relocate_kernel, sort_by_element, update_order
+from mpm.levels import element_levels, sorted_by_level, tie
+from mpm.points import cut_by_points, fill, initial_stress, relocate_kernel, sort_by_element, update_order
 from mpm.spectrum import spectral_time_step
 from mpm.time_step import critical_time_step, dry_wave_speed, fast_wave_speed
 from mpm.transfer import advance_kernel, rates_kernel, update_kernel
@@ -43,7 +44,12 @@ from mpm.variables import (
 PARTS = 2  # parts of the mesh that sum at the nodes on their own: fixed, so the bits do not depend on threads
 STEPS_BETWEEN_SORTS = 100
 STEPS_BETWEEN_SPECTRA = 2 * STEPS_BETWEEN_SORTS  # a spectrum costs about a dozen steps
+STEPS_BETWEEN_SPECTRA_OF_LEVELS = 25  # when a step is a dozen steps of the smallest elements
+ALMOST = 1.1  # a step shortened by less to meet an output time counts as limited by what limited it before
+# Of the spectral step over that of the altitude. Beyond, a few points resist nothing where they are: no estimate.
+MOST_OVER_ALTITUDE = 4.0
 SMALLEST_PARALLEL = 4000  # elements; below it a second thread costs more than it brings
+SMALLEST_CUT = 4000  # points, nodes or rows of some levels; fewer are not cut into parts, whatever the threads
 
 
 class RunFailed(RuntimeError):
@@ -66,47 +72,52 @@ class Solver:
     """
 
     def __init__(self, scene, mesh, threads=None):
-        self.scene, self.mesh = scene, mesh
+        self.scene = scene
+        mesh = self.mesh = self._cut_into_levels(mesh)
         self.points, self.element_of_point, self.soil_of_point = fill(mesh, scene)
         self.soils = soil_table(scene)
         self.parts = PARTS
         self._choose_kernels()
         m, n = len(mesh.elements), len(mesh.nodes)
-        self.geometry = element_geometry(mesh)
+        n_rows = len(self.levels.of_row)
         self.neighbours = element_neighbours(mesh, outflow_nodes(scene, mesh))
         self.fixed = np.zeros(n, np.int8)
         self.fixed[mesh.left] |= FIXED_X
         self.fixed[mesh.right] |= FIXED_X
         self.fixed[mesh.bottom] |= FIXED_X | FIXED_Y
         self._build_contact()
+        self._node_cuts = [_even(int(size)) for size in self.levels.node_cuts[1:]]
+        self._row_cuts = [_even(int(size)) for size in self.levels.row_cuts[1:]]
         self.start = np.zeros(m + 1, np.int32)
         self.order = np.zeros(len(self.points), np.int32)
         self.occupied = np.zeros(m, np.int32)
-        self.sums = np.zeros((PARTS, n, BUFFER_WIDTH))
-        self.momenta = np.zeros((PARTS, n, 4))
-        self.nodal_means = np.zeros((PARTS, n, NODAL_MEANS))
-        self.nodes = np.zeros((n, NODE_WIDTH))
+        self.sums = np.zeros((PARTS, n_rows, BUFFER_WIDTH))
+        self.momenta = np.zeros((PARTS, n_rows, 4))
+        self.nodal_means = np.zeros((PARTS, n_rows, NODAL_MEANS))
+        self.nodes = np.zeros((n_rows, NODE_WIDTH))
+        self.tied_means = np.zeros((n_rows - n, 6))
         self.status = np.zeros(n, np.int8)
         self.rates = np.zeros((m, RATE_WIDTH))
         self.volume = np.zeros((m, 2))
+        self.ahead = np.zeros(m)
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
         self.threads = 1 if m < SMALLEST_PARALLEL else max(1, min(threads or cores, PARTS))
         self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
         self.clamps = np.zeros((PARTS, len(CLAMPS)), np.int64)
         self.ledger = np.zeros((PARTS, len(LEDGER)))
         self.largest_courant = 0.0
-        self.time, self.step_count, self.point_steps = 0.0, 0, 0
+        self.time, self.long_step_count, self.step_count, self.point_steps = 0.0, 0, 0, 0
         self.initial_volume = self._volumes()
         self.initial_grain_mass = float(np.sum(self.points[:, MASS]))
         self.initial = self.sums_over_points()
         self._spare = self.start.copy(), self.order.copy()
         self._moved = np.zeros(len(self.points), np.int32), np.zeros(len(self.points), np.int32)
-        self.longest_step, self.mode = math.inf, None
+        self.longest_step, self.mode = math.inf, None  # spectral step [s] and its mode
         self._sort()
         self._update_wave_speed()
         # the projection of the initial pore pressure: hydrostatic, exact for linear functions
         _, pressure = initial_stress(scene, -mesh.nodes[:, 1])
-        self.nodes[:, V_P] = pressure
+        self.set_projected_pressure(pressure)
         self._mapped = False  # whether `sums` holds the points as they are
         self.removed_mass = 0.0
         self.suspended = 0
@@ -114,18 +125,35 @@ class Solver:
 
     # -- set-up ---------------------------------------------------------------------------------
 
+    def _cut_into_levels(self, mesh):
+        """Sort the elements by level, finest first, and tie the levels; one level without local time stepping."""
+        altitude = element_geometry(mesh)[:, 7]
+        level = np.zeros(len(altitude), np.int8)
+        if self.scene.numerics.local_time_stepping:
+            weight = np.full(len(altitude), float(self.scene.discretisation.points_per_element))
+            level = element_levels(mesh.elements, len(mesh.nodes), altitude, weight)
+        mesh, level = sorted_by_level(mesh, level)
+        self.levels = tie(mesh.elements, len(mesh.nodes), level)
+        self.geometry = element_geometry(mesh)
+        return mesh
+
+    def set_projected_pressure(self, pressure):
+        """Start the projection of the pore pressure from values at the nodes, (n_nodes,) float64 [Pa]."""
+        self.nodes[:, V_P] = pressure[self.levels.node_of_row]
+
     def _choose_kernels(self):
         """Kernels compiled for what the scene has, and nothing else."""
         scene = self.scene
         wet = scene.water is not None
         plastic = any(soil.model == "mohr-coulomb" for soil in scene.soils)
         self._solve_nodes = solve_nodes if wet else solve_dry_nodes
-        self._advance_points = advance_kernel(wet)
+        tied = self.levels.count > 1
+        self._advance_points = advance_kernel(wet, tied)
         self._remap_nodes = remap_kernel(wet)
         self._rates = rates_kernel(wet)
         dilatant = plastic and any(soil.dilatancy_angle > 0 for soil in scene.soils if soil.model != "elastic")
-        self._update = update_kernel(wet, plastic, scene.numerics.volumetric_smoothing, dilatant)
-        self._relocate_points = relocate_kernel(wet)
+        self._update = update_kernel(wet, plastic, scene.numerics.volumetric_smoothing, dilatant, tied)
+        self._relocate_points = relocate_kernel(wet, tied)
         self._water_density = scene.water.density if wet else 0.0
         self._water_modulus = scene.water.bulk_modulus if wet else 0.0
 
@@ -213,12 +241,10 @@ class Solver:
         self._cut()
 
     def _cut(self):
-        self._element_cuts = [0]
-        for part in range(1, PARTS):
-            element = np.searchsorted(self.start, part * self.n_active // PARTS, side="right") - 1
-            self._element_cuts.append(int(np.searchsorted(self.occupied[: self.n_occupied], element)))
-        self._element_cuts.append(self.n_occupied)
-        self._node_cuts = np.linspace(0, len(self.mesh.nodes), PARTS + 1).astype(int).tolist()
+        """Where the elements with points of all levels up to each one are cut into parts of as many points."""
+        self._element_cuts, self._points_up_to = cut_by_points(
+            self.start, self.occupied, self.n_occupied, self.levels.element_cuts, PARTS, SMALLEST_CUT
+        )
 
     def _sort_physically(self):
         inside = self.order[: self.n_active]
@@ -246,31 +272,38 @@ class Solver:
                             modulus, self._water_modulus, float(porosity.min()), soil.grain_density, self._water_density
                         )
                     )
-        self.wave_speed = max(speeds)
+        self.wave_speed = self.limit_speed = max(speeds)
         if self.scene.numerics.critical_step == "spectral" and self.n_occupied:
-            shortest = float(self.geometry[self.occupied[: self.n_occupied], 7].min())
+            held = self.occupied[: self.n_occupied]
+            shortest = float((self.geometry[held, 7] / 2.0 ** self.levels.of_element[held]).min())
             certain = 0.5 * shortest / self.wave_speed if self.mode is None else 0.8 * self.longest_step
             step, self.mode = spectral_time_step(self, certain, self.mode)
-            self.wave_speed = shortest / step
+            if step > MOST_OVER_ALTITUDE * shortest / self.wave_speed:
+                step = 0.5 * shortest / self.wave_speed
+            self.limit_speed = shortest / step
             self.longest_step = step
 
     # -- threads --------------------------------------------------------------------------------
 
-    def over_elements(self, kernel, *arguments, per_range=()):
-        """Run a kernel over all occupied elements, one range a thread; returns the list of its results."""
-        return self._over(self._element_cuts, kernel, arguments, per_range)
+    def over_elements(self, kernel, *arguments, per_range=(), up_to=-1):
+        """Run a kernel over the occupied elements of levels up to `up_to`; returns the list of the ranges' results.
 
-    def over_nodes(self, kernel, *arguments, per_range=()):
-        """Run a kernel over all nodes, one range a thread; returns the list of its results."""
-        return self._over(self._node_cuts, kernel, arguments, per_range)
+        Each range gets its own of the `per_range` arrays; the ranges do not depend on the number of threads.
+        """
+        return self._over(self._element_cuts[up_to].tolist(), kernel, arguments, per_range)
+
+    def over_nodes(self, kernel, *arguments, per_range=(), up_to=-1):
+        """Run a kernel over the list of nodes whose finest level is at most `up_to`, as `over_elements`."""
+        return self._over(self._node_cuts[up_to], kernel, arguments, per_range)
 
     def _over(self, cuts, kernel, arguments, per_range):
         def call(r):
             return kernel(cuts[r], cuts[r + 1], *arguments, *(a[r] for a in per_range))
 
-        if self._pool is None:
-            return [call(r) for r in range(PARTS)]
-        others = [self._pool.submit(call, r) for r in range(1, PARTS)]
+        ranges = range(len(cuts) - 1 if cuts[1] < cuts[-1] else 1)
+        if self._pool is None or len(ranges) == 1:
+            return [call(r) for r in ranges]
+        others = [self._pool.submit(call, r) for r in ranges[1:]]
         return [call(0), *(o.result() for o in others)]
 
     # -- information ----------------------------------------------------------------------------
@@ -280,16 +313,28 @@ class Solver:
         """Number of material points, those taken out included."""
         return len(self.points)
 
+    def nodal_sums(self):
+        """What the points were last mapped to at the nodes: (n_nodes, 13) float64, columns `B_` of variables."""
+        rows, n = self.sums.sum(axis=0), len(self.mesh.nodes)
+        np.add.at(rows, self.levels.node_of_row[n:], rows[n:])
+        return rows[:n]
+
     def memory_bytes(self):
         """Bytes held in the arrays of the solver."""
         return sum(a.nbytes for a in vars(self).values() if isinstance(a, np.ndarray))
 
     def time_step_estimate(self):
-        """Time step of the state at hand [s] and the name of what limits it."""
+        """Time step of the smallest elements that hold points [s] and the name of what limits it."""
         if not self._mapped:
             self.map_points()
         limits = [*self._limits, (self.longest_step, 0.0)]
-        return critical_time_step(limits, self.wave_speed, self.scene.numerics.courant)
+        dt, limit = critical_time_step(limits, self.limit_speed, self.scene.numerics.courant)
+        return dt * self._finest_step, limit
+
+    @property
+    def _finest_step(self):
+        """Steps of level 0 in one of the finest level that holds points."""
+        return 2.0 ** int(self.levels.of_element[self.occupied[0]]) if self.n_occupied else 1.0
 
     def points_by_name(self):
         """Copy of the state of all points, one array a variable, with volume, displacement and soil number."""
@@ -303,12 +348,15 @@ class Solver:
 
     # -- stages ---------------------------------------------------------------------------------
 
-    def _element_rates(self):
+    def _element_rates(self, up_to=-1):
         self.over_elements(
-            self._rates, self.occupied, self.mesh.elements, self.geometry, self.nodes, self.volume, self.rates,
-            per_range=(self.nodal_means,),
+            self._rates, self.occupied, self.levels.rows, self.geometry, self.nodes, self.volume, self.rates,
+            per_range=(self.nodal_means,), up_to=up_to,
         )  # fmt: skip
-        self.over_nodes(smooth_rates, self.nodal_means, self.nodes)
+        self._over(
+            self._row_cuts[up_to], smooth_rates,
+            (self.levels.row_order, self.nodal_means, self.momenta, self.sums, self.nodes), (),
+        )  # fmt: skip
 
     def map_points(self):
         """Sum the points at the nodes without advancing anything; sets the limits of the time step."""
@@ -317,15 +365,16 @@ class Solver:
         self.volume[:, 0] = np.bincount(element, volume, len(self.volume))
         self.volume[:, 1] = np.bincount(element, volume * (self.points[inside, P] > 0), len(self.volume))
         self._element_rates()
-        self._limits = [o[3:] for o in self._update_points(0.0, False)]
+        self._limits = [o[3:] for o in self._update_points(np.zeros(self.levels.count), False)]
         self._mapped = True
 
-    def _update_points(self, dt, advance):
+    def _update_points(self, dt_of_level, advance, up_to=-1):
         return self.over_elements(
             self._update, self.occupied, self.start, self.order, self.points, self.soil_of_point, self.soils,
-            self._water_density, self._water_modulus, self.mesh.elements, self.geometry, self.nodes, self.rates,
-            self.volume, dt, advance, self.wave_speed, self.element_of_point,
-            per_range=(self.clamps, self.sums),
+            self._water_density, self._water_modulus, self.levels.rows, self.geometry, self.nodes, self.rates,
+            self.volume, self.levels.of_element, dt_of_level, self.ahead, advance, self.limit_speed,
+            self.element_of_point,
+            per_range=(self.clamps, self.sums), up_to=up_to,
         )  # fmt: skip
 
     def relax(self, progress=None):
@@ -355,48 +404,72 @@ class Solver:
         self.gate_open = False
 
     def step(self, dt_max=math.inf):
-        """Advance by one time step, not longer than dt_max [s]; returns (dt, name of its limit)."""
-        numerics, density = self.scene.numerics, self._water_density
-        layout = (self.occupied, self.start, self.order, self.points, self.soil_of_point, self.soils)
-        grid = (self.mesh.elements, self.geometry, self.nodes)
-        wall = (self.fixed, self.contact_of_node, self.normal, self.active)
-
+        """Advance by one step of the coarsest level, not longer than dt_max [s]; returns (dt, name of its limit)."""
         if not self._mapped:
             self.map_points()
-        dt, limit = critical_time_step([*self._limits, (self.longest_step, 0.0)], self.wave_speed, numerics.courant)
-        if dt > dt_max:
-            dt, limit = dt_max, "output"
+        smallest, limit = self.time_step_estimate()
+        points = np.diff(self.start[self.levels.element_cuts])
+        periods, steps = self.levels.plan(points, dt_max / smallest)
+        count = int(periods[-1])
+        if steps * count * smallest > dt_max:
+            if steps * count * smallest > ALMOST * dt_max:
+                limit = "output"
+            smallest = dt_max / (steps * count)
+        dt_of_level = smallest * periods
+        if self.levels.count > 1:
+            self.ahead[:] = self.levels.ahead(periods)
+        for k in range(count):
+            self._substep(dt_of_level, _last_multiple(periods, k), _last_multiple(periods, k + 1))
+        self.time += smallest * count
+        self.long_step_count += 1
+        if self.long_step_count % STEPS_BETWEEN_SORTS == 0:
+            self._sort_physically()
+        if self.long_step_count % self._steps_between_speeds() == 0:
+            self._update_wave_speed()
+        return smallest * count, limit
+
+    def _steps_between_speeds(self):
+        if self.scene.numerics.critical_step == "altitude":
+            return STEPS_BETWEEN_SORTS
+        return STEPS_BETWEEN_SPECTRA if self.levels.count == 1 else STEPS_BETWEEN_SPECTRA_OF_LEVELS
+
+    def _substep(self, dt_of_level, begun, finished):
+        """One step of the finest level: levels up to `begun` begin their own now, those up to `finished` end it."""
+        numerics, density, levels = self.scene.numerics, self._water_density, self.levels
+        smallest = float(dt_of_level[0]) / self._finest_step  # of level 0, as the limits
+        layout = (self.occupied, self.start, self.order, self.points, self.soil_of_point, self.soils)
+        nodes = (levels.nodes, levels.next_row, levels.of_row)
+        wall = (self.fixed, self.contact_of_node, self.normal, self.active)
+
         self.over_nodes(
-            self._solve_nodes, self.sums, dt, self.scene.gravity, density, *wall, self.friction, self.nodes,
-            self.status, self.impulse, per_range=(self.ledger,),
+            self._solve_nodes, *nodes, begun, dt_of_level, self.sums, self.tied_means, self.scene.gravity, density,
+            *wall, self.friction, self.nodes, self.status, self.impulse, per_range=(self.ledger,), up_to=begun,
         )  # fmt: skip
         self.over_elements(
-            self._advance_points, *layout, density, *grid, dt, math.exp(-numerics.pic_rate * dt),
-            numerics.pressure_filter, per_range=(self.momenta,),
+            self._advance_points, *layout, density, levels.rows, self.geometry, self.nodes, self.tied_means,
+            levels.of_element, dt_of_level, np.exp(-numerics.pic_rate * dt_of_level), numerics.pressure_filter,
+            per_range=(self.momenta,), up_to=finished,
         )  # fmt: skip
-        self.over_nodes(self._remap_nodes, self.momenta, *wall, self.nodes, self.status)
-        self._element_rates()
-        outcome = self._update_points(dt, True)
+        self.over_nodes(
+            self._remap_nodes, *nodes, finished, dt_of_level, self.momenta, self.sums, self.tied_means, *wall,
+            self.nodes, self.status, up_to=finished,
+        )  # fmt: skip
+        self._element_rates(finished)
+        outcome = self._update_points(dt_of_level, True, finished)
         self._check(outcome)
         self._limits = [o[3:] for o in outcome]
-        self.largest_courant = max(self.largest_courant, dt / min(self._limits)[0])
+        self.largest_courant = max(self.largest_courant, smallest / min(self._limits)[0])
         self.suspended = sum(o[2] for o in outcome)
-        if any(o[0] for o in outcome):
-            self._relocate()
-        self.time += dt
+        self.point_steps += int(self._points_up_to[finished])
         self.step_count += 1
-        self.point_steps += self.n_active
-        if self.step_count % STEPS_BETWEEN_SORTS == 0:
-            self._sort_physically()
-            if self.step_count % STEPS_BETWEEN_SPECTRA == 0 or self.scene.numerics.critical_step == "altitude":
-                self._update_wave_speed()
-        return dt, limit
+        if any(o[0] for o in outcome):
+            self._relocate(finished)
 
-    def _relocate(self):
+    def _relocate(self, finished):
         n_moved, removed, *limit = self._relocate_points(
             self.element_of_point, self.points, self.soil_of_point, self.soils, self._water_density,
-            self.mesh.elements, self.geometry, self.neighbours, self.nodes, self.wave_speed, self.volume, self.sums[0],
-            self.clamps[0], *self._moved,
+            self.levels.rows, self.geometry, self.neighbours, self.nodes, self.limit_speed, self.volume,
+            self.levels.of_element, finished, self.sums[0], self.clamps[0], *self._moved,
         )  # fmt: skip
         self._limits.append(tuple(limit))
         if removed:
@@ -531,6 +604,15 @@ class Solver:
                 }
             )
         return result
+
+
+def _even(size):
+    return np.linspace(0, size, PARTS + 1 if size >= SMALLEST_CUT else 2).astype(int).tolist()
+
+
+def _last_multiple(periods, k):
+    """The coarsest level whose period divides k."""
+    return int(np.flatnonzero(k % periods == 0)[-1])
 
 
 def soil_table(scene):

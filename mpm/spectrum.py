@@ -9,6 +9,10 @@ The stiffness holds what the kernels hold: mean volume changes, element strains,
 nodes, twice, with the points between (velocities return to the nodes through them, MUSL), which takes the shortest
 waves of consistent-mass kind away. Altitude over wave speed knows none of this.
 
+With local time stepping the step of level 0 is sought for which the same holds when the stiffness of every element is
+multiplied by the square of its own step over that of level 0, and the drag of a node by the step of its finest level.
+Where the stress that acts runs ahead by a share a of a step, dt^2 k (1 + 2 a) = 4 m: a damping of a dt k, explicit.
+
 With a share s of PIC velocities are multiplied by g = 1 - s + s f in a step, where 0 <= f <= 1 is what the way
 through the points leaves of the mode; then dt^2 k = 2 (1 + g) m, and dt sqrt(1 - s/2) is not above any of these.
 """
@@ -42,7 +46,8 @@ class Spectrum:
         points, element = solver.points[inside], solver.element_of_point[inside]
         soil = solver.soils[solver.soil_of_point[inside]]
         used = np.unique(element)
-        corners, geometry = mesh.elements[used], solver.geometry[used]
+        corners, geometry, levels = mesh.elements[used], solver.geometry[used], solver.levels
+        self.step_of_node = 2.0 ** levels.of_row[: len(mesh.nodes)]
         element = np.searchsorted(used, element)
         n_nodes, n_elements = len(mesh.nodes), len(used)
         g = geometry[element]
@@ -71,24 +76,27 @@ class Spectrum:
             rows, columns = np.repeat(corners, 3, axis=1), np.tile(corners, (1, 3))
             return csr_array((data.ravel(), (rows.ravel(), columns.ravel())), (n_nodes, n_nodes))
 
+        ahead = levels.ahead(2.0 ** np.arange(levels.count))[used]
+        stiffened = volume * (4.0 ** levels.of_element[used] * (1 + 2 * ahead))[element]
         own = volume * (soil[:, S_SIN_DIL] > 0.0)
         self.own = np.divide(total(own), total(volume))  # share that takes its element's own rates
-        self.lam, self.shear = total(volume * soil[:, S_LAMBDA]), total(volume * soil[:, S_G])
+        self.lam, self.shear = total(stiffened * soil[:, S_LAMBDA]), total(stiffened * soil[:, S_G])
         self.wet = scene.water is not None
         self.through_solid, self.mass_solid = self._through(consistent_mass(mass))
         if self.wet:
             water = volume * solver._water_density
-            self.q_solid = total(volume * solver._water_modulus * (1 - porosity) / porosity)
-            self.q_liquid = total(volume * solver._water_modulus)
+            self.q_solid = total(stiffened * solver._water_modulus * (1 - porosity) / porosity)
+            self.q_liquid = total(stiffened * solver._water_modulus)
             self.through_liquid, self.mass_liquid = self._through(consistent_mass(water))
             self.mass_pore = at_nodes(porosity * water)
             self.drag = at_nodes(porosity * soil[:, S_DRAG] * water)
         self.smoothing = scene.numerics.volumetric_smoothing
         if self.smoothing:
-            self.to_nodes = csr_array((np.ones(3 * n_elements), (column, row)), (n_nodes, n_elements))
+            rows = levels.rows[used].ravel()
+            self.to_nodes = csr_array((np.ones(3 * n_elements), (rows, row)), (len(levels.of_row), n_elements))
             self.volume = total(volume)
             sums = self.to_nodes @ self.volume
-            self.per_volume = np.divide(1.0, sums, out=np.zeros(n_nodes), where=sums > 0)
+            self.per_volume = np.divide(1.0, sums, out=np.zeros_like(sums), where=sums > 0)
         self.free_x = (self.mass_solid > 0) & ((solver.fixed & FIXED_X) == 0)
         self.free_y = (self.mass_solid > 0) & ((solver.fixed & FIXED_Y) == 0)
 
@@ -110,11 +118,12 @@ class Spectrum:
             sxx, syy = sxx - pressure, syy - pressure
         force = -(self.gx.T @ sxx + self.gy.T @ sxy), -(self.gx.T @ sxy + self.gy.T @ syy)
         result = np.zeros_like(velocity)
+        drag = self.drag * self.step_of_node if self.wet else None
         for k, (free, gradient) in enumerate(((self.free_x, self.gx), (self.free_y, self.gy))):
             if self.wet:
                 ms, ml, mn = self.mass_solid[free], self.mass_liquid[free], self.mass_pore[free]
                 push = (gradient.T @ pressure)[free]
-                pair = free_pair.py_func(force[k][free], push, ms, ml, mn, 0.5 * dt * self.drag[free])
+                pair = free_pair.py_func(force[k][free], push, ms, ml, mn, 0.5 * dt * drag[free])
                 result[k, free], result[k + 2, free] = pair
                 result[k + 2] = np.where(free, self.through_liquid @ result[k + 2], 0.0)
             else:
@@ -183,5 +192,6 @@ def spectral_time_step(solver, shortest, start=None):
         if not 0 < value < math.inf:
             return shortest, None
         dt = 2.0 / math.sqrt(value)
-    pic_share = -math.expm1(-solver.scene.numerics.pic_rate * dt)
+    longest = dt * 2.0 ** (solver.levels.count - 1)
+    pic_share = -math.expm1(-solver.scene.numerics.pic_rate * longest)
     return SAFETY * math.sqrt(1 - 0.5 * pic_share) * dt, start

@@ -161,7 +161,7 @@ def relax(solver, friction, tolerance, max_steps, progress=None):
     """
     s = solver
     s.map_points()
-    mapped = s.sums.sum(axis=0)
+    mapped = s.nodal_sums()
     held_liquid = mapped[:, B_FLX : B_FLY + 1].copy()
     held_liquid[:, 1] -= mapped[:, B_ML] * s.scene.gravity
     force = np.zeros((s.parts, len(s.mesh.nodes), 2))

@@ -11,9 +11,12 @@ ARRAYS = (
     "points", "element_of_point", "soil_of_point", "initial_volume", "nodes", "sums", "volume", "impulse", "clamps",
     "ledger",
 )  # fmt: skip
-#: Numbers: simulated time [s], counters, grains taken out [kg/m], speed of the fast wave [m/s], spectral step [s].
+#: Numbers: simulated time [s], counters, grains taken out [kg/m], speed of the fast wave and that which gives
+#: the step [m/s], spectral step [s].
 NUMBERS = (
-    "time", "step_count", "point_steps", "removed_mass", "suspended", "wave_speed", "largest_courant", "longest_step",
+    "time", "step_count", "long_step_count", "point_steps", "removed_mass", "suspended",
+    "wave_speed", "limit_speed", "largest_courant",
+    "longest_step",
 )  # fmt: skip
 
 
@@ -53,6 +56,8 @@ def restore_solver(solver, state):
             )
     for name in ARRAYS:
         getattr(solver, name)[:] = state[name]
+    for buffer in (solver.momenta, solver.nodal_means):  # empty between two steps
+        buffer[:] = 0.0
     for name in NUMBERS:
         setattr(solver, name, type(getattr(solver, name))(state[name]))
     solver.mode = np.array(state["mode"], float) if len(state["mode"]) else None

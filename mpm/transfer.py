@@ -9,7 +9,7 @@ from functools import cache
 
 import numpy as np
 
-from mpm.jit import kernel
+from mpm.jit import inline_kernel, kernel
 from mpm.materials.mohr_coulomb import mohr_coulomb
 from mpm.variables import (
     B_D,
@@ -86,32 +86,55 @@ from mpm.variables import (
 PROJECTION_SMOOTHING = 0.1
 
 
+@inline_kernel
+def on_element(n0, n1, n2):
+    """Barycentric coordinates of the point of an element's edge that stands for one a little outside."""
+    n0, n1, n2 = max(n0, 0.0), max(n1, 0.0), max(n2, 0.0)
+    total = n0 + n1 + n2
+    return n0 / total, n1 / total, n2 / total
+
+
 @cache
-def advance_kernel(wet):
-    """Kernel `advance_points` for points with pore water or without."""
+def advance_kernel(wet, tied):
+    """Kernel `advance_points` for points with pore water or without, on levels tied to each other or on one."""
 
     @kernel
     def advance_points(
-        first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, elements, geometry, nodes,
-        dt, flip_fraction, pressure_filter, sums,
+        first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, rows, geometry, nodes,
+        mean, level_of_element, dt_of_level, flip_of_level, pressure_filter, sums,
     ):  # fmt: skip
         """Advance point velocities and positions from the nodes and map the new momenta back (MUSL).
 
-        Velocities take `flip_fraction` of the FLIP and the rest of the PIC update; positions move with
+        Velocities take `flip_of_level` of the FLIP and the rest of the PIC update; positions move with
         the solid. A positive pore pressure is drawn by `pressure_filter` towards its projection on
         continuous linear functions: what such a function can represent is left as it is.
-        `sums` (n_nodes, 4) receives the new momenta of both phases [kg m/s per metre].
+
+        mean : (n_rows - n_nodes, 6) float64
+            Of rows tied to a finer one: mean velocities over the steps of their node, of :mod:`mpm.contact`.
+        sums : (n_rows, 4) float64
+            Added: the new momenta of both phases [kg m/s per metre].
 
         Source: Sulsky, Zhou & Schreyer (1995) for MUSL; Zhu & Bridson (2005) for the PIC/FLIP blend.
         """
-        sums[:] = 0.0
+        n_nodes = nodes.shape[0] - mean.shape[0]
         for k in range(first, last):
             e = occupied[k]
+            dt = dt_of_level[level_of_element[e]]
+            flip_fraction = flip_of_level[level_of_element[e]]
             g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
             x0, y0 = geometry[e, 4], geometry[e, 5]
-            a = nodes[elements[e, 0]]
-            b = nodes[elements[e, 1]]
-            c = nodes[elements[e, 2]]
+            a = nodes[rows[e, 0]]
+            b = nodes[rows[e, 1]]
+            c = nodes[rows[e, 2]]
+            if tied:
+                # points move with the mean over all steps of a node, which ends with another velocity
+                jx0 = jx1 = jx2 = jy0 = jy1 = jy2 = 0.0
+                if rows[e, 0] >= n_nodes:
+                    jx0, jy0 = mean[rows[e, 0] - n_nodes, 0] - a[V_SX], mean[rows[e, 0] - n_nodes, 1] - a[V_SY]
+                if rows[e, 1] >= n_nodes:
+                    jx1, jy1 = mean[rows[e, 1] - n_nodes, 0] - b[V_SX], mean[rows[e, 1] - n_nodes, 1] - b[V_SY]
+                if rows[e, 2] >= n_nodes:
+                    jx2, jy2 = mean[rows[e, 2] - n_nodes, 0] - c[V_SX], mean[rows[e, 2] - n_nodes, 1] - c[V_SY]
             sx0 = sx1 = sx2 = sy0 = sy1 = sy2 = lx0 = lx1 = lx2 = ly0 = ly1 = ly2 = 0.0
             pic = 1.0 - flip_fraction
             for j in range(start[e], start[e + 1]):
@@ -123,11 +146,16 @@ def advance_kernel(wet):
                 n1 = g1x * dx + g1y * dy
                 n2 = g2x * dx + g2y * dy
                 n0 = 1.0 - n1 - n2
+                if tied and (n0 < 0.0 or n1 < 0.0 or n2 < 0.0):
+                    n0, n1, n2 = on_element(n0, n1, n2)
                 gx = n0 * a[V_SX] + n1 * b[V_SX] + n2 * c[V_SX]
                 gy = n0 * a[V_SY] + n1 * b[V_SY] + n2 * c[V_SY]
                 vx = flip_fraction * (row[VSX] + n0 * a[V_DSX] + n1 * b[V_DSX] + n2 * c[V_DSX]) + pic * gx
                 vy = flip_fraction * (row[VSY] + n0 * a[V_DSY] + n1 * b[V_DSY] + n2 * c[V_DSY]) + pic * gy
                 row[VSX], row[VSY] = vx, vy
+                if tied:
+                    gx += n0 * jx0 + n1 * jx1 + n2 * jx2
+                    gy += n0 * jy0 + n1 * jy1 + n2 * jy2
                 row[X] += dt * gx
                 row[Y] += dt * gy
                 sx0 += n0 * m * vx
@@ -152,19 +180,19 @@ def advance_kernel(wet):
                     ly0 += n0 * w * uy
                     ly1 += n1 * w * uy
                     ly2 += n2 * w * uy
-            d = sums[elements[e, 0]]
+            d = sums[rows[e, 0]]
             d[0] += sx0
             d[1] += sy0
             if wet:
                 d[2] += lx0
                 d[3] += ly0
-            d = sums[elements[e, 1]]
+            d = sums[rows[e, 1]]
             d[0] += sx1
             d[1] += sy1
             if wet:
                 d[2] += lx1
                 d[3] += ly1
-            d = sums[elements[e, 2]]
+            d = sums[rows[e, 2]]
             d[0] += sx2
             d[1] += sy2
             if wet:
@@ -179,21 +207,20 @@ def rates_kernel(wet):
     """Kernel `element_rates` for points with pore water or without."""
 
     @kernel
-    def element_rates(first, last, occupied, elements, geometry, nodes, volume, rates, sums):
+    def element_rates(first, last, occupied, rows, geometry, nodes, volume, rates, sums):
         """Strain rates, spin and divergences of the remapped velocities, constant in an element [1/s].
 
         volume : (n_elements, 2) float64, of `update_points`.
-        sums : (n_nodes, 7) float64
-            Written: volume and volume times the divergence of the grains; volume under pore pressure, and
+        sums : (n_rows, 7) float64
+            Added: volume and volume times the divergence of the grains; volume under pore pressure, and
             this times both divergences and times the gradient of the projected pore pressure.
         """
-        sums[:] = 0.0
         for k in range(first, last):
             e = occupied[k]
             g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
-            a = nodes[elements[e, 0]]
-            b = nodes[elements[e, 1]]
-            c = nodes[elements[e, 2]]
+            a = nodes[rows[e, 0]]
+            b = nodes[rows[e, 1]]
+            c = nodes[rows[e, 2]]
             ux1, ux2 = b[V_SX] - a[V_SX], c[V_SX] - a[V_SX]
             uy1, uy2 = b[V_SY] - a[V_SY], c[V_SY] - a[V_SY]
             xx = g1x * ux1 + g2x * ux2
@@ -205,7 +232,7 @@ def rates_kernel(wet):
             r[R_DS] = xx + yy
             v = volume[e, 0]
             for corner in range(3):
-                d = sums[elements[e, corner]]
+                d = sums[rows[e, corner]]
                 d[0] += v
                 d[1] += v * r[R_DS]
             if wet:
@@ -217,7 +244,7 @@ def rates_kernel(wet):
                 p1, p2 = b[V_P] - a[V_P], c[V_P] - a[V_P]
                 px, py = pressed * (g1x * p1 + g2x * p2), pressed * (g1y * p1 + g2y * p2)
                 for corner in range(3):
-                    d = sums[elements[e, corner]]
+                    d = sums[rows[e, corner]]
                     d[2] += pressed
                     d[3] += pressed * r[R_DS]
                     d[4] += pressed * r[R_DL]
@@ -228,7 +255,7 @@ def rates_kernel(wet):
 
 
 @cache
-def update_kernel(wet, plastic, smoothing, dilatant=False):
+def update_kernel(wet, plastic, smoothing, dilatant, tied):
     """Kernel `update_points` for what the scene has: pore water, plastic or dilatant soils, smoothed volume changes.
 
     A dilatant soil's skeleton takes the rates of its own element. Plastic volume from shear differs between elements,
@@ -237,8 +264,9 @@ def update_kernel(wet, plastic, smoothing, dilatant=False):
 
     @kernel
     def update_points(
-        first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, bulk_liquid, elements,
-        geometry, nodes, rates, volume, dt, advance, wave_speed, element_of_point, clamps, sums,
+        first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, bulk_liquid, rows,
+        geometry, nodes, rates, volume, level_of_element, dt_of_level, ahead, advance, wave_speed, element_of_point,
+        clamps, sums,
     ):  # fmt: skip
         """Advance stress, pore pressure and porosity of the points of a range of elements, and map them to the nodes.
 
@@ -258,10 +286,12 @@ def update_kernel(wet, plastic, smoothing, dilatant=False):
         volume : (n_elements, 2) float64
             Material volume, and that of points under pore pressure [m2]; read of the last and written for the
             next step.
+        ahead : (n_elements,) float64
+            How far the stress that acts on the nodes runs ahead of that of the points, in steps of the element.
         element_of_point : (n_points,) int32
             Written: -2 - element for a point that left its element.
-        sums : (n_nodes, 13) float64
-            Written: masses, momenta, drag and forces that these elements add to every node.
+        sums : (n_rows, 13) float64
+            Added: masses, momenta, drag and forces of these elements.
 
         Returns
         -------
@@ -269,9 +299,8 @@ def update_kernel(wet, plastic, smoothing, dilatant=False):
             Number of points that left their element, first point with a non-finite state or -1, and
             number of suspended points.
         limit, limit_speed : float
-            Smallest altitude / (wave speed + point speed) [s] and the point speed there [m/s].
+            Smallest altitude / (wave speed + point speed) / 2^level [s] and the point speed there [m/s].
         """
-        sums[:] = 0.0
         limit = np.inf
         limit_speed = 0.0
         moved = 0
@@ -283,7 +312,8 @@ def update_kernel(wet, plastic, smoothing, dilatant=False):
             g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
             x0, y0 = geometry[e, 4], geometry[e, 5]
             r = rates[e]
-            i0, i1, i2 = elements[e, 0], elements[e, 1], elements[e, 2]
+            dt = dt_of_level[level_of_element[e]]
+            i0, i1, i2 = rows[e, 0], rows[e, 1], rows[e, 2]
             ms0 = ms1 = ms2 = ml0 = ml1 = ml2 = mn0 = mn1 = mn2 = d0 = d1 = d2 = q0 = q1 = q2 = 0.0
             sx0 = sx1 = sx2 = sy0 = sy1 = sy2 = lx0 = lx1 = lx2 = ly0 = ly1 = ly2 = 0.0
             fxx = fxy = fyy = fp = total = pressed = fastest = 0.0
@@ -318,6 +348,9 @@ def update_kernel(wet, plastic, smoothing, dilatant=False):
                 dxx, dyy, dvol = exx, eyy, ts
                 if dilatant and s[S_SIN_DIL] > 0.0:
                     dxx, dyy, dvol = dt * r[R_XX], dt * r[R_YY], own_s
+                if tied and ahead[e] > 0.0:
+                    before = max(row[P], 0.0) if wet else 0.0
+                    cxx, cyy, cxy, cp = row[SXX] - before, row[SYY] - before, row[SXY], before
                 if advance:
                     n = row[N]
                     p = row[P]
@@ -431,10 +464,17 @@ def update_kernel(wet, plastic, smoothing, dilatant=False):
                 fyy += v * (row[SYY] - p)
                 fxy += v * row[SXY]
                 total += v
+                if tied and ahead[e] > 0.0:
+                    w = ahead[e] * v
+                    fxx += w * (row[SXX] - p - cxx)
+                    fyy += w * (row[SYY] - p - cyy)
+                    fxy += w * (row[SXY] - cxy)
+                    if wet:
+                        fp += w * (p - cp)
             volume[e, 0] = total
             volume[e, 1] = pressed
             fastest = np.sqrt(fastest)
-            local = geometry[e, 7] / (wave_speed + fastest)
+            local = geometry[e, 7] / ((wave_speed + fastest) * (1 << level_of_element[e]))
             if local < limit:
                 limit = local
                 limit_speed = fastest
@@ -499,12 +539,12 @@ def update_kernel(wet, plastic, smoothing, dilatant=False):
 
 
 @cache
-def map_kernel(wet):
-    """Kernel `map_point` for points with pore water or without."""
+def map_kernel(wet, tied):
+    """Kernel `map_point` for points with pore water or without; with levels a point may wait outside its element."""
 
     @kernel
     def map_point(row, soil, density_liquid, corner, geometry, nodes, sums):
-        """Add one point to the nodes of the element that holds it, as `update_points` does for those that stay.
+        """Add one point to the rows of the element that holds it, as `update_points` does for those that stay.
 
         row, soil, corner, geometry : one row of points, soils, elements and geometry.
         Returns the volume of the point [m2] and its larger squared speed [m2/s2].
@@ -513,6 +553,9 @@ def map_kernel(wet):
         dy = row[Y] - geometry[5]
         n1 = geometry[0] * dx + geometry[1] * dy
         n2 = geometry[2] * dx + geometry[3] * dy
+        n0 = 1.0 - n1 - n2
+        if tied and (n0 < 0.0 or n1 < 0.0 or n2 < 0.0):
+            n0, n1, n2 = on_element(n0, n1, n2)
         m, n = row[MASS], row[N]
         v = m / (soil[S_RHO_S] * (1.0 - n))
         p = max(row[P], 0.0) if wet else 0.0
@@ -520,12 +563,10 @@ def map_kernel(wet):
         fastest = row[VSX] ** 2 + row[VSY] ** 2
         if wet:
             fastest = max(fastest, row[VLX] ** 2 + row[VLY] ** 2)
-            excess = (
-                p - (1.0 - n1 - n2) * nodes[corner[0], V_P] - n1 * nodes[corner[1], V_P] - n2 * nodes[corner[2], V_P]
-            )
+            excess = p - n0 * nodes[corner[0], V_P] - n1 * nodes[corner[1], V_P] - n2 * nodes[corner[2], V_P]
         for k in range(3):
             if k == 0:
-                weight, gx, gy = 1.0 - n1 - n2, -geometry[0] - geometry[2], -geometry[1] - geometry[3]
+                weight, gx, gy = n0, -geometry[0] - geometry[2], -geometry[1] - geometry[3]
             elif k == 1:
                 weight, gx, gy = n1, geometry[0], geometry[1]
             else:

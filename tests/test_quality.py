@@ -49,11 +49,12 @@ def test_balances_while_material_gushes(event):  # noqa: F811
     # Water flows between points; what one loses another gets up to the quadrature of the divergence: 1e-5 here.
     assert abs(last["water_mass_error"]) < 1e-4
     assert last["contact_error"] < 1e-13
-    # The scene's Courant number by the state before; the jet may speed up by a tenth within a step.
+    # At most the scene's Courant number by the state before; the jet may speed up by a tenth within a step.
     courant = Numerics().courant
-    assert courant <= last["largest_courant"] < 1.2 * courant
-    # PIC and MUSL take energy, never give any: 4 % of the work of stresses here, where the jet has just begun.
-    assert 0 < last["transfer_loss"] < 0.1 * last["work_stress"]
+    assert 0.5 * courant <= last["largest_courant"] < 1.2 * courant
+    # PIC and MUSL take energy, never give any: 12 % of the work of stresses on this mesh, where the jet has just begun,
+    # 5 % with half the time step, 0.5 % without PIC.
+    assert 0 < last["transfer_loss"] < 0.2 * last["work_stress"]
 
 
 def test_quality_is_in_the_file_the_log_and_the_line(simulated, tmp_path):  # noqa: F811

@@ -254,7 +254,7 @@ def _copied(solver):
 def _restore(solver, arrays):
     for name, values in arrays.items():
         getattr(solver, name)[...] = values
-    solver.time, solver.step_count = 0.0, 0
+    solver.time, solver.step_count, solver.long_step_count = 0.0, 0, 0
 
 
 def _orthonormal(vectors):

@@ -76,7 +76,7 @@ class Monitor:
         elastic = math.sqrt(before * self.stored)  # the leapfrog keeps the product of neighbours, not their squares
         self.balance = self.kinetic + elastic - self._start - self.work
         self.created = max(self.created, self.balance)
-        if solver.step_count % 20 == 0:
+        if solver.long_step_count % 20 == 0:
             self.check()
         return dt
 

@@ -207,7 +207,8 @@ def _unload(solver, depth):
     solver.points[:, P] = pressure
     solver.points[:, SYY] = -vertical
     solver.points[:, SXX] = solver.points[:, SZZ] = -solver.scene.soils[0].k0 * vertical
-    _, solver.nodes[:, V_P] = initial_stress(solver.scene, np.maximum(-solver.mesh.nodes[:, 1] - depth, 0.0))
+    _, pressure = initial_stress(solver.scene, np.maximum(-solver.mesh.nodes[:, 1] - depth, 0.0))
+    solver.set_projected_pressure(pressure)
 
 
 def _free(solver):

@@ -13,7 +13,7 @@ class DrivenSolver(Solver):
 
     Parameters
     ----------
-    scene, mesh : as for :class:`mpm.Solver`
+    scene, mesh : as for :class:`mpm.Solver`; all elements take the same time step.
     damping : float
         Share of the change of each nodal velocity component that is taken off where it speeds the node up, and added
         where it slows it down [-]; 0 is none. Cundall (1987): a steady state keeps its loads. Not at driven nodes.
@@ -30,7 +30,8 @@ class DrivenSolver(Solver):
     """
 
     def __init__(self, scene, mesh, damping=0.0):
-        super().__init__(scene, mesh, threads=1)
+        together = scene.numerics.model_copy(update={"local_time_stepping": False})
+        super().__init__(scene.model_copy(update={"numerics": together}), mesh, threads=1)
         shape = (len(mesh.nodes), 2)
         self.damping = damping
         self.driven, self.velocity = np.zeros(shape, bool), np.zeros(shape)
@@ -38,9 +39,9 @@ class DrivenSolver(Solver):
         self.force, self.reaction = np.zeros(shape), np.zeros(shape)
         solve, remap = self._solve_nodes, self._remap_nodes
 
-        def driven_solve(first, last, sums, dt, *rest):
-            solve(first, last, sums, dt, *rest)
-            self._drive(slice(first, last), dt)
+        def driven_solve(first, last, which, next_row, level_of_row, begun, dt_of_level, *rest):
+            solve(first, last, which, next_row, level_of_row, begun, dt_of_level, *rest)
+            self._drive(slice(first, last), float(dt_of_level[0]))
 
         def driven_remap(first, last, *rest):
             remap(first, last, *rest)

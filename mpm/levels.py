@@ -1,0 +1,203 @@
+"""Levels of local time stepping: elements grouped by powers of two of their own time step.
+
+The elements of a level are a mesh of their own with its own nodal sums, projected pressure and mean rates. Where levels
+meet, a node has one *row* a level, and the rows are tied: they share mass, forces and velocity. The node takes the step
+of its finest level. A coarser row's forces stay as they were at the beginning of its own, longer step, its momentum
+follows the node's velocity, and its points are moved at the end by what the node did in all of its steps. The forces of
+an element add up to zero over its nodes and act for one and the same time on all of them, so momentum is conserved.
+A force is held over the step of its element, not given as one kick at its beginning: kicks of prestressed ground would
+shake nodes that are in equilibrium. But a held force acts late at a finer node, by half of what the steps differ, and a
+late spring feeds motion; so the stress of elements that meet a finer level runs ahead by that (`Levels.ahead`).
+
+Source: nodes with steps of their own after Belytschko, Yen & Mullen (1979), Mixed methods for time integration;
+elements with steps of their own after Lew, Marsden, Ortiz & West (2003), Asynchronous variational integrators.
+"""
+
+import copy
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+MOST_LEVELS = 8
+OFFSETS = np.linspace(0.5, 1.0, 17)  # of the shortest altitude: where the borders between levels may lie
+
+
+@dataclass(frozen=True, eq=False)
+class Levels:
+    """How a mesh is cut into levels, the finest one 0.
+
+    Attributes
+    ----------
+    of_element : (n_elements,) int8
+        Ascending.
+    rows : (n_elements, 3) int32
+        Row of each corner. Row i is that of the finest level at node i; rows of coarser levels follow after all nodes.
+    next_row : (n_rows,) int32
+        The next coarser row of the same node, or -1.
+    node_of_row : (n_rows,) int32
+    of_row : (n_rows,) int8
+    nodes : (n_nodes,) int32
+        Nodes by their finest level; `node_cuts` (n_levels + 1,) says where each begins.
+    row_order : (n_rows,) int32
+        Rows by level, with `row_cuts` (n_levels + 1,); `element_cuts` (n_levels + 1,) does so for elements.
+    """
+
+    of_element: NDArray[np.int8]
+    rows: NDArray[np.int32]
+    next_row: NDArray[np.int32]
+    node_of_row: NDArray[np.int32]
+    of_row: NDArray[np.int8]
+    nodes: NDArray[np.int32]
+    node_cuts: NDArray[np.int64]
+    row_order: NDArray[np.int32]
+    row_cuts: NDArray[np.int64]
+    element_cuts: NDArray[np.int64]
+
+    @property
+    def count(self):
+        """Number of levels."""
+        return len(self.element_cuts) - 1
+
+    def plan(self, points, most):
+        """How the levels step on the way to the next output time, at the least work.
+
+        Parameters
+        ----------
+        points : (n_levels,) int
+            Points held by each level.
+        most : float
+            Time until then over the step of the finest level that holds points [-]; may be infinite.
+
+        Returns
+        -------
+        periods : (n_levels,) int64
+            Steps of the finest level that holds points in one step of each level: powers of two, ascending.
+        steps : int
+            Steps of the coarsest level until then, all of one length; 1 where there is no such time.
+        """
+        held = np.flatnonzero(points)
+        finest, coarsest = (held[0], held[-1]) if len(held) else (0, 0)
+        best, least = None, math.inf
+        for top in range(finest, coarsest + 1):
+            periods = 1 << (np.clip(np.arange(self.count), finest, top) - finest).astype(np.int64)
+            steps = max(math.ceil(most / int(periods[-1]) - 1e-9), 1) if most < math.inf else 1
+            span = steps * int(periods[-1])  # in steps of the finest level
+            work = float((points * (span / periods)).sum()) / (1.0 if most < math.inf else span)
+            if work <= least:
+                best, least = (periods, steps), work
+        return best
+
+    def ahead(self, periods):
+        """How far the stress of elements that meet a finer level has to run ahead, in steps of the element.
+
+        At a node of a finer level a force held over N of its steps acts later than the stress that it comes from, by
+        (N - 1)/2 of them in the mean. Held back, a spring drives the motion that stretches it.
+
+        Returns
+        -------
+        (n_elements,) float64
+            (N - 1) / (2 N) by the finest level at the element's nodes; 0 where they all are of its own.
+        """
+        n_nodes = len(self.nodes)
+        finest = self.of_row[self.node_of_row[self.rows]].min(axis=1)
+        share = periods[finest] / periods[self.of_element]
+        return np.where((self.rows >= n_nodes).any(axis=1), 0.5 * (1.0 - share), 0.0)
+
+
+def element_levels(elements, n_nodes, altitude, weight):
+    """Level of every element, such that its altitude is at least 2^level times that of level 0.
+
+    The altitude where level 0 begins lies between half and all of the shortest one: where the work is least.
+
+    Parameters
+    ----------
+    elements : (n_elements, 3) int32
+    n_nodes : int
+    altitude : (n_elements,) float64
+        Smallest altitude [m]; the time step is proportional to it.
+    weight : (n_elements,) float64
+        Work of an element in a step, in any unit.
+
+    Returns
+    -------
+    (n_elements,) int8
+    """
+    best, least = np.zeros(len(elements), np.int8), float(weight.sum())
+    for offset in OFFSETS[::-1]:
+        own = np.floor(np.log2(altitude / (offset * altitude.min())) + 1e-9).astype(np.int8)
+        level = _without_islands(_widened(np.minimum(own, MOST_LEVELS - 1), elements, n_nodes), elements, n_nodes)
+        work = float((weight / 2.0**level).sum()) / offset
+        if work < 0.999 * least:
+            best, least = level, work
+    return best
+
+
+def _finest_at_nodes(level, elements, n_nodes):
+    finest = np.full(n_nodes, MOST_LEVELS, np.int8)
+    np.minimum.at(finest, elements.ravel(), np.repeat(level, 3))
+    return finest
+
+
+def _widened(level, elements, n_nodes):
+    """Give all elements around a node its finest level, so that the smallest element has a whole patch around it."""
+    return _finest_at_nodes(level, elements, n_nodes)[elements].min(axis=1)
+
+
+def _without_islands(level, elements, n_nodes):
+    """Lower elements none of whose nodes lies within their own level: alone they would not share volume changes."""
+    while True:
+        lower = np.minimum(level, _finest_at_nodes(level, elements, n_nodes)[elements].max(axis=1))
+        if np.array_equal(lower, level):
+            return level
+        level = lower
+
+
+def sorted_by_level(mesh, level):
+    """The mesh with its elements in the order of their level, and the levels in that order."""
+    order = np.argsort(level, kind="stable")
+    if np.array_equal(order, np.arange(len(order))):
+        return mesh, level
+    mesh = copy.copy(mesh)
+    object.__setattr__(mesh, "elements", np.ascontiguousarray(mesh.elements[order]))
+    object.__setattr__(mesh, "region", np.ascontiguousarray(mesh.region[order]))
+    return mesh, level[order]
+
+
+def tie(elements, n_nodes, level):
+    """Rows of the nodes for elements in the order of their level.
+
+    Returns
+    -------
+    Levels
+    """
+    count = int(level.max()) + 1
+    pairs = np.unique(np.column_stack([elements.ravel(), np.repeat(level, 3)]).astype(np.int64), axis=0)
+    node, of_pair = pairs.T
+    first = np.ones(len(pairs), bool)
+    first[1:] = node[1:] != node[:-1]
+    row = np.where(first, node, 0)
+    row[~first] = n_nodes + np.arange((~first).sum())
+    n_rows = n_nodes + int((~first).sum())
+    next_row, node_of_row = np.full(n_rows, -1, np.int32), np.arange(n_rows, dtype=np.int32)
+    of_row = np.zeros(n_rows, np.int8)  # a node of no element: level 0, without mass
+    of_row[row] = of_pair
+    node_of_row[row] = node
+    next_row[row[:-1][~first[1:]]] = row[1:][~first[1:]]
+    number = np.full((n_nodes, count), -1, np.int32)
+    number[node, of_pair] = row
+    nodes, rows = np.argsort(of_row[:n_nodes], kind="stable"), np.argsort(of_row, kind="stable")
+    edges = np.arange(count + 1)
+    return Levels(
+        of_element=np.ascontiguousarray(level, np.int8),
+        rows=np.ascontiguousarray(number[elements, level[:, None]]),
+        next_row=next_row,
+        node_of_row=node_of_row,
+        of_row=of_row,
+        nodes=nodes.astype(np.int32),
+        node_cuts=np.searchsorted(of_row[:n_nodes][nodes], edges),
+        row_order=rows.astype(np.int32),
+        row_cuts=np.searchsorted(of_row[rows], edges),
+        element_cuts=np.searchsorted(level, edges),
+    )
