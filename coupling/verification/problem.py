@@ -77,11 +77,7 @@ def register(problem: Problem) -> Problem:
 def problems() -> dict[str, Problem]:
     """All problems by name, in the order of their families."""
     for family in FAMILIES:
-        try:
-            importlib.import_module(f"coupling.verification.{family}")
-        except ModuleNotFoundError as error:
-            if error.name != f"coupling.verification.{family}":
-                raise
+        importlib.import_module(f"coupling.verification.{family}")
     return dict(_REGISTRY)
 
 
