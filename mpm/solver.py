@@ -43,8 +43,9 @@ from mpm.variables import (
 
 PARTS = 2  # parts of the mesh that sum at the nodes on their own: fixed, so the bits do not depend on threads
 STEPS_BETWEEN_SORTS = 100
-STEPS_BETWEEN_SPECTRA = 2 * STEPS_BETWEEN_SORTS  # a spectrum costs about a dozen steps
-STEPS_BETWEEN_SPECTRA_OF_LEVELS = 25  # when a step is a dozen steps of the smallest elements
+# Long steps between spectra, each of which costs about a dozen: soon again where the critical step has fallen, as when
+# points have left the places they began in.
+FEWEST_BETWEEN_SPECTRA, MOST_BETWEEN_SPECTRA, MOST_BETWEEN_SPECTRA_OF_LEVELS = 5, 200, 50
 ALMOST = 1.1  # a step shortened by less to meet an output time counts as limited by what limited it before
 # Of the spectral step over that of the altitude. Beyond, a few points resist nothing where they are: no estimate.
 MOST_OVER_ALTITUDE = 4.0
@@ -113,6 +114,7 @@ class Solver:
         self._spare = self.start.copy(), self.order.copy()
         self._moved = np.zeros(len(self.points), np.int32), np.zeros(len(self.points), np.int32)
         self.longest_step, self.mode = math.inf, None  # spectral step [s] and its mode
+        self.estimate_interval, self.next_estimate = STEPS_BETWEEN_SORTS, 0  # long steps between estimates of the step
         self._sort()
         self._update_wave_speed()
         # the projection of the initial pore pressure: hydrostatic, exact for linear functions
@@ -280,8 +282,12 @@ class Solver:
             step, self.mode = spectral_time_step(self, certain, self.mode)
             if step > MOST_OVER_ALTITUDE * shortest / self.wave_speed:
                 step = 0.5 * shortest / self.wave_speed
+            most = MOST_BETWEEN_SPECTRA if self.levels.count == 1 else MOST_BETWEEN_SPECTRA_OF_LEVELS
+            fallen = step < 0.9 * self.longest_step
+            self.estimate_interval = FEWEST_BETWEEN_SPECTRA if fallen else min(2 * self.estimate_interval, most)
             self.limit_speed = shortest / step
             self.longest_step = step
+        self.next_estimate = self.long_step_count + self.estimate_interval
 
     # -- threads --------------------------------------------------------------------------------
 
@@ -424,14 +430,9 @@ class Solver:
         self.long_step_count += 1
         if self.long_step_count % STEPS_BETWEEN_SORTS == 0:
             self._sort_physically()
-        if self.long_step_count % self._steps_between_speeds() == 0:
+        if self.long_step_count >= self.next_estimate:
             self._update_wave_speed()
         return smallest * count, limit
-
-    def _steps_between_speeds(self):
-        if self.scene.numerics.critical_step == "altitude":
-            return STEPS_BETWEEN_SORTS
-        return STEPS_BETWEEN_SPECTRA if self.levels.count == 1 else STEPS_BETWEEN_SPECTRA_OF_LEVELS
 
     def _substep(self, dt_of_level, begun, finished):
         """One step of the finest level: levels up to `begun` begin their own now, those up to `finished` end it."""

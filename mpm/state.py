@@ -15,7 +15,7 @@ ARRAYS = (
 #: the step [m/s], spectral step [s].
 NUMBERS = (
     "time", "step_count", "long_step_count", "point_steps", "removed_mass", "suspended",
-    "wave_speed", "limit_speed", "largest_courant",
+    "estimate_interval", "next_estimate", "wave_speed", "limit_speed", "largest_courant",
     "longest_step",
 )  # fmt: skip
 
