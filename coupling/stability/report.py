@@ -136,6 +136,9 @@ def page(linear, verdicts):
 
 def _reading(linear):
     """What the numbers of the map say, one list item a line."""
+    from mpm.scene import Numerics
+
+    courant = Numerics().courant
     low, high = (float(getattr(linear.spectral_ratio, name)()) for name in ("min", "max"))
     kept = ALLOWED[0] <= low and high <= ALLOWED[1]
     above = linear.isel(configuration=(linear.altitude_ratio > 1).values)
@@ -147,7 +150,7 @@ def _reading(linear):
         f"- Altitude: {float(linear.altitude_ratio.min()):.2f} .. {float(linear.altitude_ratio.max()):.2f}. Where the "
         f"program places the points, on straight cells, the median is {float(usual.altitude_ratio.median()):.2f}.",
         f"- Altitude above the actual step in {above.sizes['configuration']} columns: {_described(above)}. At the "
-        f"default Courant number of 0.5 {int((linear.altitude_ratio > 2).sum())} columns are unstable.",
+        f"default Courant number of {courant:g} {int((courant * linear.altitude_ratio > 1).sum())} columns are unstable.",
         f"- Growth of more than 1e-5 a step at half the actual step in {growing.sizes['configuration']} columns: "
         f"{_described(growing)}.",
     ]
