@@ -93,7 +93,8 @@ class Column:
             "discretisation": {**size, "gate_radius": self.size, "points_per_element": self.points},
             "numerics": {
                 "courant": 1.0, "pic_rate": self.pic_rate, "pressure_filter": self.pressure_filter,
-                "volumetric_smoothing": self.volumetric_smoothing,
+                "volumetric_smoothing": self.volumetric_smoothing, "critical_step": "altitude",
+                "local_time_stepping": False,
             },
             "stop": {"time": 1.0},
             "output": {"interval": 1.0},

@@ -88,7 +88,8 @@ def _shapes(axis, part):
     _limits(axis)
     axis.set_xticks([0, 0.3, 1, 1.3, 2, 2.3], ["0.3", "skew", "1", "skew", "3", "skew"])
     axis.set_xlabel("width over height of a cell [-]; skew: nodes moved")
-    axis.legend(loc="upper left", fontsize=5, ncols=2, columnspacing=0.8, handletextpad=0.2)
+    axis.set_ylim(0.0, 2.9)
+    axis.legend(loc="upper left", fontsize=5, ncols=3, columnspacing=0.8, handletextpad=0.2)
 
 
 def _limits(axis):
