@@ -149,8 +149,8 @@ def _reading(linear):
         f"columns; required are {ALLOWED[0]:g} .. {ALLOWED[1]:g}: {'kept' if kept else '**not kept**'}.",
         f"- Altitude: {float(linear.altitude_ratio.min()):.2f} .. {float(linear.altitude_ratio.max()):.2f}. Where the "
         f"program places the points, on straight cells, the median is {float(usual.altitude_ratio.median()):.2f}.",
-        f"- Altitude above the actual step in {above.sizes['configuration']} columns: {_described(above)}. At a Courant "
-        f"number of {courant:g} {int((courant * linear.altitude_ratio > 1).sum())} columns are unstable.",
+        f"- Altitude above the actual step in {above.sizes['configuration']} columns: {_described(above)}. At a "
+        f"Courant number of {courant:g} {int((courant * linear.altitude_ratio > 1).sum())} columns are unstable.",
         f"- Growth of more than 1e-5 a step at half the actual step in {growing.sizes['configuration']} columns: "
         f"{_described(growing)}.",
     ]
