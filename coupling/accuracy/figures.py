@@ -50,29 +50,30 @@ def problem_figure(title: str, norm: str, rows: list[dict]):
     return figure
 
 
-def overview_figure(rows: list[dict]):
-    """Default of every problem: error over processor time, with its name."""
+def overview_figure(rows: list[dict], limits: dict[str, float]):
+    """Default of every problem, a line each: error with its limit, and processor time.
+
+    limits : largest error that a problem's test allows, by its name.
+    """
     import matplotlib
 
     from coupling.figures import STYLE
 
+    defaults = [row for row in rows if row["setting"] == "default"][::-1]
     with matplotlib.rc_context(STYLE):
-        figure = _figure(7.4, 4.4)
-        axes = figure.subplots()
-        defaults = sorted((row for row in rows if row["setting"] == "default"), key=lambda row: row["cpu_seconds"])
-        for row in defaults:
-            if math.isfinite(row["error"]):
-                axes.plot(row["cpu_seconds"], _shown(row["error"]), "o", ms=4, color="#0b5394")
-                axes.annotate(
-                    row["problem"], (row["cpu_seconds"], _shown(row["error"])), (5, 2), textcoords="offset points",
-                    fontsize=7,
-                )  # fmt: skip
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-        axes.set_xlabel("processor time of stepping [s]")
-        axes.set_ylabel("error in the problem's norm [-]")
-        axes.set_title("verification problems at their fast setting")
-        axes.grid(True)
+        figure = _figure(7.0, 1.0 + 0.19 * len(defaults))
+        error, cost = figure.subplots(1, 2, sharey=True, width_ratios=(3, 2))
+        at = range(len(defaults))
+        error.plot([_shown(row["error"]) for row in defaults], at, "o", ms=4, color="#0b5394", label="error")
+        error.plot([limits[row["problem"]] for row in defaults], at, "|", ms=8, color="0.3", label="limit of the test")
+        cost.plot([row["cpu_seconds"] for row in defaults], at, "o", ms=4, color="#b45f06")
+        for axes in (error, cost):
+            axes.set_xscale("log")
+            axes.grid(True)
+        error.set_yticks(at, [row["problem"] for row in defaults], fontsize=7)
+        error.set_xlabel("error in the problem's norm [-]")
+        error.legend(fontsize=7, loc="lower left")
+        cost.set_xlabel("processor time of stepping [s]")
     return figure
 
 

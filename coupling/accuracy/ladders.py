@@ -12,6 +12,11 @@ from coupling.verification.problem import Problem
 COUNTS = ("cells", "elements", "columns", "rows", "across", "steps", "increments", "points_per_element", "points")
 #: Settings that are a mesh size or a time step.
 SIZES = ("size", "element_size", "spacing", "courant", "dt", "time_step")
+#: Settings of verification problems that pose another problem.
+POSED = (
+    "aspect", "conductivity", "duration", "friction", "height", "inertia", "periods", "rough", "rough_base", "settlement",
+    "slope", "stiffness", "strain", "time_factor", "times", "turn", "cover", "release", "mode",
+)  # fmt: skip
 #: Errors at or below this are round-off: nothing can be gained there.
 ROUND_OFF = 1e-12
 
@@ -106,10 +111,10 @@ def assess(rows: Iterable[dict]) -> dict:
 
 
 def physical_settings() -> set[str]:
-    """Names of settings that are parameters of soil and water, not numerical choices; K_w is both and stays out."""
+    """Names of settings that pose another problem and are no numerical choice; K_w is both and stays out."""
     from mpm.scene import Soil, Water
 
-    return {*Soil.model_fields, *Water.model_fields} - {"bulk_modulus"}
+    return {*Soil.model_fields, *Water.model_fields, *POSED} - {"bulk_modulus"}
 
 
 def _costs(rows, known):

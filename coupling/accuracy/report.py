@@ -12,6 +12,24 @@ from coupling.accuracy import figures
 from coupling.accuracy.ladders import assess, dataset
 from coupling.provenance import revision
 
+READING = """
+## What it says
+
+- **Where theory is smooth the orders are its own**: two for waves, vibrations and the lining's pressures over mesh size,
+  one for consolidation from a jump, for rotation and flight over the time step.
+- **Defaults.** `courant = 0.8`: down to 0.2 no error falls by more than the scatter, but for flight, sliding and the two
+  walls, whose errors are small; the time is then four times as long. `pressure_filter` moves consolidation and seepage by
+  less than 0.1 % of the load. `volumetric_smoothing` is what lets bearing capacity come down to Prandtl's. `pic_rate` costs nothing;
+  10 per second is a compromise: waves want none, and splashing water would rather have 100.
+- **Off the front.** Where a coarser mesh beats the default (walls, trapdoor, water column) errors of opposite sign cancel
+  on it; more elements do not make these errors smaller, since the reference idealises (a front without thickness, slip
+  planes where the soil has a shear band). Three points an element instead of twelve are cheaper in flows and let the
+  material run into itself, which the norm does not see.
+- **What does not converge.** Collapses into the open (column, dam, water column) stay at 8 to 11 % of their references,
+  and so does the water's mass in the closed box: the points carry the water of their pores, and what seeps from point to
+  point follows from divergences. In case 3 that loss is 4e-5 of all water.
+"""
+
 
 def write(rows: list[dict], problems: dict, folder: Path) -> dict:
     """Write accuracy.md, accuracy.nc and images/ into a folder.
@@ -36,12 +54,15 @@ def write(rows: list[dict], problems: dict, folder: Path) -> dict:
         name: [row for row in rows if row["problem"] == name] for name in dict.fromkeys(r["problem"] for r in rows)
     }
     summary = {name: _summary(mine, problems[name]) for name, mine in by_name.items()}
-    figures.save(figures.overview_figure(rows), folder / "images" / "accuracy-overview.png")
+    figures.save(
+        figures.overview_figure(rows, {name: problems[name].limit for name in by_name}),
+        folder / "images" / "accuracy-overview.png",
+    )
     page = [
         "# Error against run time",
         "",
-        f"Made by `gush accuracy` {origin()}. Errors are in the norm of each problem, times are processor time of",
-        "stepping, one thread; compiling is left out.",
+        f"Made by `gush accuracy` {origin()}.",
+        "Errors are in the norm of each problem, times are processor time of stepping, one thread; compiling is left out.",
         "",
         "![overview](images/accuracy-overview.png)",
         "",
@@ -59,6 +80,7 @@ def write(rows: list[dict], problems: dict, folder: Path) -> dict:
             f"| [{name}](#{name}) | {entry['error']:.2e} | {entry['limit']:.2g} | {entry['cpu_seconds']:.2f} |"
             f" {orders or '-'} | {entry['excess']:.2f} |"
         )
+    page += ["", *READING.strip().splitlines()]
     for name, mine in by_name.items():
         page += _section(problems[name], mine, folder)
     (folder / "accuracy.md").write_text("\n".join(page) + "\n", encoding="utf-8")
