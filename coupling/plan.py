@@ -40,8 +40,8 @@ def plan(scene, threads=None):
     return {
         "scene": scene.name,
         "features": features(scene, solver.threads),
-        "elements": len(mesh.elements),
-        "nodes": len(mesh.nodes),
+        "elements": len(solver.mesh.elements),
+        "nodes": len(solver.mesh.nodes),
         "points": int(solver.n_points),
         "min_altitude": float(mesh.quality["min_altitude"]),
         "min_angle": float(mesh.quality["min_angle"]),
@@ -118,7 +118,7 @@ def features(scene, threads):
             f"{numerics.pressure_filter:g} of what is not smooth, a step" if numerics.pressure_filter else "set to 0",
         ),
         ("motion of the lining", False, f"lining = '{s.lining}'"),
-        ("half model", False, "the whole box is computed, also for symmetric scenes"),
+        ("the half x < 0", not s.is_half, _why_half(s)),
         (
             "snapshots of the points",
             snapshots is not None,
@@ -132,6 +132,12 @@ def features(scene, threads):
         ),
     )
     return [{"feature": name, "active": bool(active), "reason": reason} for name, active, reason in table]
+
+
+def _why_half(s):
+    if s.is_half:
+        return "the scene is its own mirror image: x >= 0 is computed, results are of the whole"
+    return s.asymmetry or "symmetry = 'whole'; 'auto' would compute x >= 0 only"
 
 
 def _measured_rate(solver):

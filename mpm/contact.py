@@ -44,7 +44,7 @@ from mpm.variables import (
     V_WS,
 )
 
-FIXED_X, FIXED_Y = 1, 2
+FIXED_X, FIXED_Y, MIRROR_X = 1, 2, 4
 SOLID_HELD, SOLID_STICKS, LIQUID_HELD = 1, 2, 4
 
 
@@ -86,7 +86,7 @@ def solve_nodes(
     sums : (n_parts, n_nodes, 13) float64
         What the parts of the mesh add to the nodes; added in the order of the parts.
     fixed, status : (n_nodes,) int8
-        Box boundary bits; written: which constraints acted.
+        Bits of box boundary and mirror line; written: which constraints acted.
     contact_of_node : (n_nodes,) int32
         Row of the contact arrays or -1.
     normal, active, friction : (n_contact, 2), (n_contact,), (n_contact,)
@@ -117,6 +117,8 @@ def solve_nodes(
             fy += b[B_FY]
             flx += b[B_FLX]
             fly += b[B_FLY]
+        if fixed[i] & MIRROR_X:  # the mirror image's momentum is the opposite
+            psx = plx = 0.0
         row = nodes[i]
         row[V_MS] = ms
         row[V_ML] = ml
@@ -216,6 +218,8 @@ def solve_dry_nodes(
             py += b[B_PSY]
             fx += b[B_FX]
             fy += b[B_FY]
+        if fixed[i] & MIRROR_X:
+            px = 0.0
         row = nodes[i]
         row[V_MS] = ms
         status[i] = 0
