@@ -136,7 +136,8 @@ def whole_ring(nodes_of_half: int) -> NDArray[np.int64]:
 def ring_factors(nodes_of_half: int) -> NDArray[np.float64]:
     """What makes the whole ring's sums at the lining of those of the half: (n_nodes, 5), columns as of `impulse`.
 
-    A node on the mirror line felt half of the force, and none along the face; the mirror turns the shear around.
+    A node on the mirror line felt half of the force. What its contact recorded along the face is the push of the half
+    against its mirror image, which the line takes up; there is no shear. The mirror turns the others around.
     """
     whole = whole_ring(nodes_of_half)
     share = np.where((whole == 0) | (whole == nodes_of_half - 1), 2.0, 1.0)

@@ -196,10 +196,9 @@ class Solver:
         self._closed = self.normal, self.active
         self.friction = np.array(friction, float)
         self.lining = lining
-        self._on_mirror_line = np.isin(np.array(node, int), self.mirror_line)
+        on_mirror_line = np.isin(np.array(node, int), self.mirror_line)
         for normal in (self.normal, self._normal_open):
-            normal[self._on_mirror_line, 0] = 0.0
-        self.friction[self._on_mirror_line] = 0.0
+            normal[on_mirror_line, 0] = 0.0
         self.impulse = np.zeros((len(node), 5))
 
     def _ring(self, outer):
@@ -359,7 +358,7 @@ class Solver:
         numerics = self.scene.numerics
         friction = self.friction
         if self.scene.initial_contact == "bonded":
-            friction = np.where(self._on_mirror_line, 0.0, np.inf)
+            friction = np.full_like(friction, np.inf)
         steps, residual, reaction = stages.relax(
             self, friction, numerics.relaxation_tolerance, numerics.max_relaxation_steps, progress
         )
