@@ -89,11 +89,17 @@ def features(scene, threads):
     if resolved:
         inside = "material falls, piles up, can choke the gate"
     snapshots = s.output.snapshot_interval
+    points = f"every {snapshots:g} s" if snapshots else "only the first and the last: no snapshot_interval"
     table = (
         (
             "pore water",
             s.water is not None,
             f"water table {s.water.table_depth:g} m below the surface" if s.water else "dry: no liquid is computed",
+        ),
+        (
+            "two velocities, of grains and water",
+            s.water is not None,
+            "also where they hardly differ: drag is implicit, no permeability limits the step" if s.water else "dry",
         ),
         (
             "Mohr-Coulomb return mapping",
@@ -104,7 +110,7 @@ def features(scene, threads):
         (
             "friction on the lining",
             bool(resting),
-            f"coefficient {', '.join(resting)}" if resting else "no lining with friction",
+            f"coefficient {', '.join(resting)}" if resting else _frictionless(s),
         ),
         ("tunnel interior", resolved, inside),
         (
@@ -121,8 +127,8 @@ def features(scene, threads):
         ("the half x < 0", not s.is_half, _why_half(s)),
         (
             "snapshots of the points",
-            snapshots is not None,
-            f"every {snapshots:g} s" if snapshots else "only the first and the last: no snapshot_interval",
+            s.output.points,
+            points if s.output.points else "pressures and history only: output.points = false",
         ),
         ("several threads", threads > 1, f"{threads} threads" if threads > 1 else "one core, or too few elements"),
         (
@@ -132,6 +138,10 @@ def features(scene, threads):
         ),
     )
     return [{"feature": name, "active": bool(active), "reason": reason} for name, active, reason in table]
+
+
+def _frictionless(s):
+    return "coefficient 0: the wall takes the normal part only" if s.tunnels else "no tunnel"
 
 
 def _why_half(s):

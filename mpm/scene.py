@@ -220,10 +220,18 @@ class Stop(Part):
 
 
 class Output(Part):
-    """Interval of the records and of the snapshots of all points [s]."""
+    """Interval of the records and of the snapshots of all points [s].
+
+    Parameters
+    ----------
+    points : bool
+        Whether snapshots of the points are kept, the first and the last also without an interval. False: none,
+        whatever the interval says; pressures and history are all that is wanted.
+    """
 
     interval: Time = Field(gt=0)
     snapshot_interval: Time | None = Field(default=None, gt=0)
+    points: bool = True
 
 
 class Scene(Part):

@@ -16,7 +16,7 @@ BUILT = {
     "active", "friction", "lining", "threads", "initial_grain_mass", "initial", "_normal_open", "_active_open",
     "_closed", "_pool", "_node_cuts", "_solve_nodes", "_advance_points", "_remap_nodes", "_rates", "_update",
     "_relocate_points", "_water_density", "_water_modulus", "start", "order", "occupied", "n_occupied", "n_active",
-    "_element_cuts",
+    "_element_cuts", "copies", "mirror_line",
 }  # fmt: skip
 #: Written by each step before it is read.
 SCRATCH = {"momenta", "nodal_means", "status", "rates", "_spare", "_moved"}
