@@ -49,7 +49,10 @@ def export(run, kind, out=None):
     file = run_file(run)
     points = read_points(file)
     if "x" not in points or not points.sizes.get("time"):
-        raise RunFileError(f"run file '{file}': holds no snapshot of the points yet; nothing can be exported")
+        raise RunFileError(
+            f"run file '{file}': holds no snapshot of the points, nothing can be exported; did the "
+            "scene say output.points = false, or is the run at its beginning?"
+        )
     folder = _prepared(file.parent / FIELDS if out is None else Path(out), kind)
     if kind == "gif":
         return [_animation(points, folder / "gushing.gif")]

@@ -40,8 +40,8 @@ def plan(scene, threads=None):
     return {
         "scene": scene.name,
         "features": features(scene, solver.threads),
-        "elements": len(mesh.elements),
-        "nodes": len(mesh.nodes),
+        "elements": len(solver.mesh.elements),
+        "nodes": len(solver.mesh.nodes),
         "points": int(solver.n_points),
         "min_altitude": float(mesh.quality["min_altitude"]),
         "min_angle": float(mesh.quality["min_angle"]),
@@ -89,11 +89,17 @@ def features(scene, threads):
     if resolved:
         inside = "material falls, piles up, can choke the gate"
     snapshots = s.output.snapshot_interval
+    points = f"every {snapshots:g} s" if snapshots else "only the first and the last: no snapshot_interval"
     table = (
         (
             "pore water",
             s.water is not None,
             f"water table {s.water.table_depth:g} m below the surface" if s.water else "dry: no liquid is computed",
+        ),
+        (
+            "two velocities, of grains and water",
+            s.water is not None,
+            "also where they hardly differ: drag is implicit, no permeability limits the step" if s.water else "dry",
         ),
         (
             "Mohr-Coulomb return mapping",
@@ -104,7 +110,7 @@ def features(scene, threads):
         (
             "friction on the lining",
             bool(resting),
-            f"coefficient {', '.join(resting)}" if resting else "no lining with friction",
+            f"coefficient {', '.join(resting)}" if resting else _frictionless(s),
         ),
         ("tunnel interior", resolved, inside),
         (
@@ -118,11 +124,11 @@ def features(scene, threads):
             f"{numerics.pressure_filter:g} of what is not smooth, a step" if numerics.pressure_filter else "set to 0",
         ),
         ("motion of the lining", False, f"lining = '{s.lining}'"),
-        ("half model", False, "the whole box is computed, also for symmetric scenes"),
+        ("the half x < 0", not s.is_half, _why_half(s)),
         (
             "snapshots of the points",
-            snapshots is not None,
-            f"every {snapshots:g} s" if snapshots else "only the first and the last: no snapshot_interval",
+            s.output.points,
+            points if s.output.points else "pressures and history only: output.points = false",
         ),
         ("several threads", threads > 1, f"{threads} threads" if threads > 1 else "one core, or too few elements"),
         (
@@ -132,6 +138,16 @@ def features(scene, threads):
         ),
     )
     return [{"feature": name, "active": bool(active), "reason": reason} for name, active, reason in table]
+
+
+def _frictionless(s):
+    return "coefficient 0: the wall takes the normal part only" if s.tunnels else "no tunnel"
+
+
+def _why_half(s):
+    if s.is_half:
+        return "the scene is its own mirror image: x >= 0 is computed, results are of the whole"
+    return s.asymmetry or "symmetry = 'whole'; 'auto' would compute x >= 0 only"
 
 
 def _measured_rate(solver):

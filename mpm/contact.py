@@ -44,7 +44,7 @@ from mpm.variables import (
     V_WS,
 )
 
-FIXED_X, FIXED_Y = 1, 2
+FIXED_X, FIXED_Y, MIRROR_X = 1, 2, 4
 SOLID_HELD, SOLID_STICKS, LIQUID_HELD = 1, 2, 4
 
 
@@ -110,7 +110,7 @@ def solve_nodes(
         Of rows tied to a finer one: mean over their step so far of the velocity of the grains, and of the remapped
         velocities of both phases.
     fixed, status : (n_nodes,) int8
-        Box boundary bits; written: which constraints acted.
+        Bits of box boundary and mirror line; written: which constraints acted.
     contact_of_node : (n_nodes,) int32
         Row of the contact arrays or -1.
     normal, active, friction : (n_contact, 2), (n_contact,), (n_contact,)
@@ -153,6 +153,8 @@ def solve_nodes(
             elif level_of_row[r] <= begun:
                 nodes[r, V_P] += q * density_liquid / ml_row
             r = next_row[r]
+        if fixed[i] & MIRROR_X:  # the mirror image's momentum is the opposite
+            psx = plx = 0.0
         row = nodes[i]
         row[V_MS] = ms
         row[V_ML] = ml
@@ -276,6 +278,8 @@ def solve_dry_nodes(
                 fx += b[B_FX]
                 fy += b[B_FY]
             r = next_row[r]
+        if fixed[i] & MIRROR_X:
+            px = 0.0
         row = nodes[i]
         row[V_MS] = ms
         status[i] = 0

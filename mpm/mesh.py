@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mpm.half_model import right_half, with_mirror_image
 from mpm.scene import Scene, Tunnel
 
 if TYPE_CHECKING:
@@ -29,6 +30,9 @@ SOIL, CHANNEL, INTERIOR, HEADROOM = 0, 1, 2, 3
 MIN_RELATIVE_ALTITUDE = 0.3
 # Meshing algorithms of gmsh in the order tried until no triangle is flatter than that: frontal, Delaunay, adaptive.
 ALGORITHMS = (6, 5, 1)
+# Share of the element size within which a node belongs to the mirror line x = 0 of a half model: those of the strip
+# through the gate are relocated by some thousandths.
+ON_MIRROR_LINE = 0.02
 SYSTEM_PACKAGES = "libglu1-mesa libgl1 libxrender1 libxcursor1 libxft2 libxinerama1 libgomp1"
 
 
@@ -346,9 +350,17 @@ class _Drawing:
             self.lines[a, b] = self.geo.addLine(a, b)
         return self.lines[a, b]
 
+    def chain(self, points: list[int]) -> list[int]:
+        """Lines from each point to the next."""
+        return [self.line(a, b) for a, b in pairwise(points)]
+
+    def on_axis(self, points: list[int]) -> int:
+        """The point nearest to x = 0."""
+        return min(points, key=lambda tag: abs(self.exact[tag][0]))
+
     def edges(self, chain: list[int]) -> list[int]:
         """Lines that are one mesh edge each."""
-        tags = [self.line(a, b) for a, b in pairwise(chain)]
+        tags = self.chain(chain)
         for tag in tags:
             self.geo.mesh.setTransfiniteCurve(abs(tag), 2)
         return tags
@@ -453,17 +465,27 @@ def _draw(scene: Scene, gmsh: Any) -> tuple[_Drawing, _Outline, dict[int, int], 
     levels = [-soil.top_depth for soil in scene.soils] + [-depth]
     left = [draw.point(-half, y) for y in levels]
     right = [draw.point(half, y) for y in levels]
-    upper_left, upper_right = draw.point(-half, top), draw.point(half, top)
-    side_left = [draw.line(a, b) for a, b in pairwise(left)]
-    side_right = [draw.line(a, b) for a, b in zip(right[::-1], right[-2::-1], strict=False)]
-    bottom = draw.line(left[-1], right[-1])
-    ground = draw.line(right[0], left[0])
+    # Where a line from side to side crosses the mirror line of a half model.
+    middle = _middle_points(scene, draw, levels)
+    upper = [draw.point(x, top) for x in ((-half, 0.0, half) if scene.is_half else (-half, half))]
+    side_left, side_right = draw.chain(left), draw.chain(right[::-1])
+    bottom = draw.chain([left[-1], *middle[-1], right[-1]])
+    ground = draw.chain([right[0], *middle[0], left[0]])
     rings = [draw.edges([*tags, tags[0]]) for tags in outline.outer]
-    soil = draw.surface([*side_left, bottom, *side_right, ground], *rings)
+    soil = draw.surface([*side_left, *bottom, *side_right, *ground], *rings)
     regions = {soil: SOIL}
-    above = [draw.line(left[0], right[0]), draw.line(right[0], upper_right), draw.line(upper_right, upper_left)]
-    above.append(draw.line(upper_left, left[0]))
-    regions[draw.surface(above)] = HEADROOM
+    above = draw.chain([left[0], *middle[0], right[0]]), draw.chain([right[0], *upper[::-1], left[0]])
+    headroom = draw.surface([*above[0], *above[1]])
+    regions[headroom] = HEADROOM
+    embedded = {soil: _draw_layers(scene, draw, outline, left, middle, right)}
+    if scene.is_half:
+        axis = -scene.tunnels[0].axis_depth
+        above_tunnel = [tag for tags in middle for tag in tags if draw.exact[tag][1] > axis]
+        below_tunnel = [tag for tags in middle for tag in tags if draw.exact[tag][1] < axis]
+        crown = draw.on_axis([tag for tag in outline.outer[0] if draw.exact[tag][1] > axis])
+        invert = draw.on_axis([tag for tag in outline.outer[0] if draw.exact[tag][1] < axis])
+        embedded[soil] += draw.chain([*above_tunnel, crown]) + draw.chain([invert, *below_tunnel])
+        embedded[headroom] = [draw.line(middle[0][0], upper[1])]
     if scene.gate is not None:
         (a, b), (c, d) = outline.corners, outline.inner_corners
         mouth = draw.edges([a, *outline.opening, b])
@@ -475,22 +497,36 @@ def _draw(scene: Scene, gmsh: Any) -> tuple[_Drawing, _Outline, dict[int, int], 
         regions[channel] = CHANNEL
         if scene.interior == "resolved":
             face = draw.edges([d, *outline.inner, c])
-            regions[draw.surface([*face, *[-tag for tag in throat[::-1]]])] = INTERIOR
-    embedded = _draw_layers(scene, draw, outline, left, right)
+            interior = draw.surface([*face, *[-tag for tag in throat[::-1]]])
+            regions[interior] = INTERIOR
+            if scene.is_half:
+                # The channel needs no line: it is a strip with nodes on its axis.
+                embedded[interior] = draw.chain([draw.on_axis(outline.inner_opening), draw.on_axis(outline.inner)])
     draw.geo.synchronize()
-    if embedded:
-        gmsh.model.mesh.embed(1, embedded, 2, soil)
+    for surface, lines in embedded.items():
+        if lines:
+            gmsh.model.mesh.embed(1, lines, 2, surface)
     sides_of_box = {
-        "left": [*side_left, above[3]],
-        "right": [*side_right, above[1]],
-        "bottom": [bottom],
-        "top": [above[2]],
+        "left": [*side_left, above[1][-1]],
+        "right": [*side_right, above[1][0]],
+        "bottom": bottom,
+        "top": above[1][1:-1],
     }
     return draw, outline, regions, sides_of_box
 
 
-def _draw_layers(scene: Scene, draw: _Drawing, outline: _Outline, left: list[int], right: list[int]) -> list[int]:
-    """Lines of the soil layer boundaries, interrupted by tunnels."""
+def _middle_points(scene: Scene, draw: _Drawing, levels: list[float]) -> list[list[int]]:
+    """Per level, the point at x = 0 of a half model; none where the tunnel interrupts the level or in a whole model."""
+    if not scene.is_half:
+        return [[] for _ in levels]
+    (tunnel,) = scene.tunnels
+    return [[draw.point(0.0, y)] if abs(y + tunnel.axis_depth) >= tunnel.outer_radius else [] for y in levels]
+
+
+def _draw_layers(
+    scene: Scene, draw: _Drawing, outline: _Outline, left: list[int], middle: list[list[int]], right: list[int]
+) -> list[int]:
+    """Lines of the soil layer boundaries, interrupted by tunnels and by the mirror line of a half model."""
     result = []
     for k, soil in enumerate(scene.soils[1:], start=1):
         crossings = []
@@ -499,13 +535,14 @@ def _draw_layers(scene: Scene, draw: _Drawing, outline: _Outline, left: list[int
                 by_height = sorted(tags, key=lambda tag: abs(draw.exact[tag][1] + soil.top_depth))[:2]
                 crossings.append(sorted(by_height, key=lambda tag: draw.exact[tag][0]))
         crossings.sort(key=lambda pair: draw.exact[pair[0]][0])
+        crossings += [2 * middle[k]] if middle[k] else []
         chain = [left[k], *[tag for pair in crossings for tag in pair], right[k]]
         result += [draw.line(a, b) for a, b in zip(chain[::2], chain[1::2], strict=True)]
     return result
 
 
 def build_mesh(scene: Scene) -> Mesh:
-    """Mesh a scene.
+    """Mesh a scene, the whole of it: for a half model, of a half and its mirror image.
 
     Parameters
     ----------
@@ -525,6 +562,8 @@ def build_mesh(scene: Scene) -> Mesh:
     best: tuple[float, Mesh] | None = None
     for algorithm in ALGORITHMS:
         mesh = _mesh_once(scene, gmsh, algorithm)
+        if scene.is_half:
+            mesh = with_mirror_image(right_half(mesh))
         centre = mesh.nodes[mesh.elements].mean(axis=1)
         relative = altitudes(mesh.nodes, mesh.elements) / element_size(scene, centre[:, 0], centre[:, 1])
         flattest = float(relative.min())
@@ -655,6 +694,8 @@ def _extract(
         nodes[members, axis] = value
         box[name] = members[np.argsort(nodes[members, 1 - axis])].astype(np.int32)
 
+    if scene.is_half:
+        nodes[np.abs(nodes[:, 0]) < ON_MIRROR_LINE * element_size(scene, nodes[:, 0], nodes[:, 1]), 0] = 0.0
     outer_nodes, outer_theta = [], []
     for chain, theta in zip(outline.outer, outline.theta, strict=True):
         angle = np.mod(np.array(theta), 360.0)

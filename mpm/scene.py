@@ -223,14 +223,29 @@ class Stop(Part):
 
 
 class Output(Part):
-    """Interval of the records and of the snapshots of all points [s]."""
+    """Interval of the records and of the snapshots of all points [s].
+
+    Parameters
+    ----------
+    points : bool
+        Whether snapshots of the points are kept, the first and the last also without an interval. False: none,
+        whatever the interval says; pressures and history are all that is wanted.
+    """
 
     interval: Time = Field(gt=0)
     snapshot_interval: Time | None = Field(default=None, gt=0)
+    points: bool = True
 
 
 class Scene(Part):
-    """Everything that the material point method needs to know."""
+    """Everything that the material point method needs to know.
+
+    Parameters
+    ----------
+    symmetry : str
+        "half" computes x >= 0 only and gives the results of the whole, "whole" computes both sides, "auto" is "half"
+        where `asymmetry` finds nothing that forbids it. The rest are the tables of a scene file.
+    """
 
     name: str = Field(min_length=1, max_length=80, pattern=r"^[\w.-]+$")
     gravity: Acceleration = Field(default=9.81, ge=0, le=100)
@@ -242,6 +257,7 @@ class Scene(Part):
     lining: Literal["fixed"] = "fixed"
     initial_contact: Literal["bonded", "frictional"] = "bonded"
     interior: Literal["resolved", "sink"] = "resolved"
+    symmetry: Literal["auto", "whole", "half"] = "auto"
     discretisation: Discretisation
     numerics: Numerics = Numerics()
     stop: Stop
@@ -295,6 +311,10 @@ class Scene(Part):
                 )
         elif self.stop.inflow_mass is not None and self.stop.time is None:
             raise ValueError("stop: inflow_mass is never reached without a gate; give stop.time or a gate")
+        if self.symmetry == "half" and self.asymmetry is not None:
+            raise ValueError(
+                f"symmetry: 'half' must mirror the scene in x = 0, got {self.asymmetry}; write symmetry = 'auto'"
+            )
         needed, available = self.estimated_bytes, _physical_memory()
         if needed > available:
             raise ValueError(
@@ -303,9 +323,28 @@ class Scene(Part):
             )
         return self
 
+    @property
+    def asymmetry(self):
+        """What forbids to compute the half x >= 0 only, in words; None where the scene is its own mirror image."""
+        if len(self.tunnels) != 1:
+            return f"{len(self.tunnels)} tunnels, a half model has one at x = 0"
+        if self.tunnels[0].x != 0:
+            return f"a tunnel at x = {self.tunnels[0].x:g} m, a half model has it at x = 0"
+        if self.gate is not None and self.gate.angle not in (0, 180):
+            return f"a gate at {self.gate.angle:g} degrees, a half model has it at 0 or 180"
+        across = self.discretisation.elements_across_gate
+        if self.gate is not None and across % 2:
+            return f"{across} elements across the gate, a half model needs an even number"
+        return None
+
+    @property
+    def is_half(self):
+        """Whether only x >= 0 is computed."""
+        return self.symmetry == "half" or (self.symmetry == "auto" and self.asymmetry is None)
+
     @cached_property
     def estimated_elements(self):
-        """Rough number of elements, from the integral of the inverse element area [-]."""
+        """Rough number of elements that are computed, from the integral of the inverse element area [-]."""
         d = self.discretisation
         area = 0.433  # equilateral triangle of unit edge
         count = self.box.width * self.box.depth / (area * d.element_size**2)
@@ -317,7 +356,7 @@ class Scene(Part):
             size = self.gate.width / d.elements_across_gate
             near = math.pi * (self.gate.width + size / d.size_growth) ** 2
             count += near / (area * size**2)
-        return count
+        return count / 2 if self.is_half else count
 
     @property
     def estimated_bytes(self):

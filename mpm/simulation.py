@@ -212,7 +212,7 @@ class Simulation:
             balances=solver.balances(),
             point_steps=solver.point_steps,
             cpu_seconds=self.cpu_seconds,
-            points=solver.points_by_name() if snapshot else None,
+            points=solver.points_by_name() if snapshot and self.scene.output.points else None,
             **solver.measures(),
         )
 

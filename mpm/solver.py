@@ -8,7 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from mpm import stages
-from mpm.contact import FIXED_X, FIXED_Y, remap_kernel, smooth_rates, solve_dry_nodes, solve_nodes
+from mpm.contact import FIXED_X, FIXED_Y, MIRROR_X, remap_kernel, smooth_rates, solve_dry_nodes, solve_nodes
+from mpm.half_model import right_half, ring_factors, whole_ring, with_mirrored_points
 from mpm.levels import element_levels, sorted_by_level, tie
 from mpm.points import cut_by_points, fill, initial_stress, relocate_kernel, sort_by_element, update_order
 from mpm.spectrum import spectral_time_step
@@ -28,6 +29,7 @@ from mpm.variables import (
     S_G,
     S_LAMBDA,
     SOIL_WIDTH,
+    V_GX,
     V_P,
     VLX,
     VLY,
@@ -68,11 +70,15 @@ class Solver:
     ----------
     scene : mpm.scene.Scene
     mesh : mpm.mesh.Mesh
+        Of the whole scene, also for a half model.
     threads : int or None
         Threads of the kernels; the result has the same bits for any number. None: all cores.
     """
 
     def __init__(self, scene, mesh, threads=None):
+        if scene.is_half:
+            mesh = right_half(mesh)
+        self.copies = 2 if scene.is_half else 1  # of what is computed, in the whole
         self.scene = scene
         mesh = self.mesh = self._cut_into_levels(mesh)
         self.points, self.element_of_point, self.soil_of_point = fill(mesh, scene)
@@ -86,6 +92,9 @@ class Solver:
         self.fixed[mesh.left] |= FIXED_X
         self.fixed[mesh.right] |= FIXED_X
         self.fixed[mesh.bottom] |= FIXED_X | FIXED_Y
+        self.mirror_line = mesh.left if scene.is_half else mesh.left[:0]
+        self.fixed[self.mirror_line] |= MIRROR_X
+        self.mirror_rows = np.flatnonzero(np.isin(self.levels.node_of_row, self.mirror_line))
         self._build_contact()
         self._node_cuts = [_even(int(size)) for size in self.levels.node_cuts[1:]]
         self._row_cuts = [_even(int(size)) for size in self.levels.row_cuts[1:]]
@@ -170,7 +179,7 @@ class Solver:
             a = math.radians(scene.gate.angle)
             tangent = np.array([math.cos(a), -math.sin(a)])
             # the corner on the smaller-angle side bounds the channel from below in angle
-            corner_angle = {corners[0]: tangent, corners[1]: -tangent}
+            corner_angle = {i: side * tangent for i, side in zip(corners, mesh.corner_side.tolist(), strict=True)}
         for t, tunnel in enumerate(scene.tunnels):
             axis = np.array([tunnel.x, -tunnel.axis_depth])
             outer = mesh.outer_nodes[t]
@@ -182,12 +191,16 @@ class Solver:
                 active_closed.append(True)
                 active_open.append(int(i) not in opening)
                 friction.append(tunnel.friction_coefficient)
-            edge = np.linalg.norm(np.roll(mesh.nodes[outer], -1, axis=0) - mesh.nodes[outer], axis=1)
+            theta, ring = mesh.outer_theta[t], self._ring(outer)
+            rows, factors = np.arange(first, len(node)), np.ones((1, 5))
+            if scene.is_half:
+                place = whole_ring(len(outer))
+                outer, rows, factors = outer[place], rows[place], ring_factors(len(outer))
+                theta = np.where(np.arange(len(place)) < len(theta), theta[place], 360.0 - theta[place])
+            edge = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
             arc = 0.5 * (edge + np.roll(edge, 1))
             bears_open = np.array([int(i) not in opening and int(i) not in corners for i in outer])
-            lining.append(
-                SimpleNamespace(theta=mesh.outer_theta[t], arc=arc, rows=np.arange(first, len(node)), bears=bears_open)
-            )
+            lining.append(SimpleNamespace(theta=theta, arc=arc, rows=rows, factors=factors, bears=bears_open))
         if scene.gate is not None:
             tunnel = scene.tunnels[scene.gate.tunnel]
             axis = np.array([tunnel.x, -tunnel.axis_depth])
@@ -214,7 +227,19 @@ class Solver:
         self._closed = self.normal, self.active
         self.friction = np.array(friction, float)
         self.lining = lining
+        on_mirror_line = np.isin(np.array(node, int), self.mirror_line)
+        for normal in (self.normal, self._normal_open):
+            normal[on_mirror_line, 0] = 0.0
         self.impulse = np.zeros((len(node), 5))
+
+    def _ring(self, outer):
+        """Positions of all nodes of a ring, clockwise: those of a half model and their mirror images [m]."""
+        position = self.mesh.nodes[outer]
+        if not self.scene.is_half:
+            return position
+        place = whole_ring(len(outer))
+        image = np.arange(len(place)) >= len(outer)
+        return position[place] * np.column_stack([np.where(image, -1.0, 1.0), np.ones(len(place))])
 
     def _balanced_normals(self, outer):
         """Normals of the outer face along the resultant of the hydrostatic pressure at each node.
@@ -222,7 +247,7 @@ class Solver:
         On a polygon the resultant of a pressure on the two edges of a node is not radial. A wall
         that can only push along the radius would let still water creep along it.
         """
-        position = self.mesh.nodes[outer]
+        position = self._ring(outer)
         _, pressure = initial_stress(self.scene, -position[:, 1])
         pressure = np.maximum(pressure, 1.0)  # above the water table: as for a uniform pressure
         edge = np.roll(position, -1, axis=0) - position  # clockwise to the next node
@@ -230,7 +255,7 @@ class Solver:
         after = np.roll(pressure, -1)
         force = outward * (2 * pressure + after)[:, None]
         force += np.roll(outward * (pressure + 2 * after)[:, None], 1, axis=0)
-        return force / np.linalg.norm(force, axis=1)[:, None]
+        return (force / np.linalg.norm(force, axis=1)[:, None])[: len(outer)]
 
     def _volumes(self):
         rho = np.array([s.grain_density for s in self.scene.soils])[self.soil_of_point]
@@ -350,7 +375,7 @@ class Solver:
         data["volume"] = self._volumes()
         data["soil"] = self.soil_of_point.copy()
         data["removed"] = self.element_of_point < 0
-        return data
+        return with_mirrored_points(data) if self.scene.is_half else data
 
     # -- stages ---------------------------------------------------------------------------------
 
@@ -363,6 +388,7 @@ class Solver:
             self._row_cuts[up_to], smooth_rates,
             (self.levels.row_order, self.nodal_means, self.momenta, self.sums, self.nodes), (),
         )  # fmt: skip
+        self.nodes[self.mirror_rows, V_GX] = 0.0
 
     def map_points(self):
         """Sum the points at the nodes without advancing anything; sets the limits of the time step."""
@@ -502,7 +528,7 @@ class Solver:
         tunnel = self.scene.tunnels[self.scene.gate.tunnel]
         r2 = (self.points[:, X] - tunnel.x) ** 2 + (self.points[:, Y] + tunnel.axis_depth) ** 2
         inside = (r2 < tunnel.inner_radius**2) & (self.element_of_point >= 0)
-        return float(np.sum(self.points[inside, MASS])) + self.removed_mass
+        return self.copies * (float(np.sum(self.points[inside, MASS])) + self.removed_mass)
 
     def sums_over_points(self):
         """Momentum (x, y) [N s] and kinetic energy [J] of grains and water, mass of the water [kg], per metre.
@@ -542,18 +568,21 @@ class Solver:
         """
         ledger, now = dict(zip(LEDGER, self.ledger.sum(axis=0).tolist(), strict=True)), self.sums_over_points()
         received = np.array([ledger["momentum_x"], ledger["momentum_y"]])
-        departure = float(np.abs(now["momentum"] - self.initial["momentum"] - received).max())
+        departure = np.abs(now["momentum"] - self.initial["momentum"] - received)
+        if self.scene.is_half:
+            departure = departure[1:]  # horizontal momentum comes from the mirror image, which takes as much
+        departure = float(departure.max())
         weight = self.scene.gravity * (self.initial_grain_mass + self.initial["water"]) * self.time
         change = now["kinetic"] - self.initial["kinetic"]
         water = self.initial["water"]
         return {
             "momentum_error": departure / weight if weight > 0 else 0.0,
             "water_mass_error": now["water"] / water - 1 if water > 0 else 0.0,
-            "work_gravity": ledger["gravity"],
-            "work_stress": ledger["stress"],
-            "work_drag": ledger["drag"],
-            "kinetic_energy_change": change,
-            "transfer_loss": ledger["kinetic"] - change,
+            "work_gravity": self.copies * ledger["gravity"],
+            "work_stress": self.copies * ledger["stress"],
+            "work_drag": self.copies * ledger["drag"],
+            "kinetic_energy_change": self.copies * change,
+            "transfer_loss": self.copies * (ledger["kinetic"] - change),
             "contact_error": ledger["unexplained"] / ledger["reactions"] if ledger["reactions"] > 0 else 0.0,
             "largest_courant": self.largest_courant,
         }
@@ -567,11 +596,11 @@ class Solver:
         active = self.element_of_point >= 0
         return {
             "inflow_mass": self.inflow_mass(),
-            "flow_zone_area": float(np.sum(self.initial_volume[flow])),
-            "disturbed_area": float(np.sum(self.initial_volume[(moved > 0.01) & ~flow])),
-            "grain_mass": float(np.sum(mass)),
+            "flow_zone_area": self.copies * float(np.sum(self.initial_volume[flow])),
+            "disturbed_area": self.copies * float(np.sum(self.initial_volume[(moved > 0.01) & ~flow])),
+            "grain_mass": self.copies * float(np.sum(mass)),
             "suspended_fraction": float(self.suspended) / max(self.n_active, 1),
-            "kinetic_energy": float(0.5 * np.sum((mass * speed2)[active])),
+            "kinetic_energy": self.copies * float(0.5 * np.sum((mass * speed2)[active])),
             "max_velocity": float(np.sqrt(speed2[active].max(initial=0.0))),
         }
 
@@ -585,7 +614,7 @@ class Solver:
         """
         result = []
         for part in self.lining:
-            impulse = self.impulse[part.rows] / duration
+            impulse = self.impulse[part.rows] * part.factors / duration
             bears = part.bears if self.gate_open else np.ones(len(part.arc), bool)
             arc = part.arc
             mean_s, mean_l, shear = (np.where(bears, impulse[:, k] / arc, 0.0) for k in range(3))

@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from small_event import small_scene
 
 import coupling
+import coupling.datasets
 import mpm
 import mpm.scene
-from mpm.variables import EQ, SXX, SXY, SYY, SZZ, VSX, VSY, P, X, Y
+from mpm.variables import EQ, SXX, SXY, SYY, SZZ, VLX, VLY, VSX, VSY, P, X, Y
 
 MOTION = [X, Y, VSX, VSY, EQ]
 STRESS = [SXX, SYY, SZZ, SXY]
@@ -70,3 +72,75 @@ def test_water_needs_a_permeability():
     with pytest.raises(ValueError, match="hydraulic_conductivity must be given where there is water"):
         mpm.scene.Scene.model_validate(data)
     mpm.scene.Scene.model_validate(data | {"water": None})
+
+
+def test_frictionless_scene_is_the_limit_of_vanishing_friction():
+    tunnel = scene().tunnels[0]
+    states = [
+        stepped(scene(tunnels=(tunnel.model_copy(update={"friction_coefficient": mu}),), initial_contact="frictional"))
+        for mu in (0.0, 1e-12)
+    ]
+    smooth, rough = states
+    assert not smooth.impulse[:, 2].any() and smooth.impulse[:, 0].any() and rough.impulse[:, 2].any()
+    # the shear is 1e-12 of the pressure, and 60 steps and the relaxation add it up
+    scale = np.abs(smooth.points[:, STRESS]).max()
+    assert np.abs(smooth.points[:, STRESS] - rough.points[:, STRESS]).max() < 1e-8 * scale
+    assert np.abs(smooth.points[:, MOTION] - rough.points[:, MOTION]).max() < 1e-8
+
+
+def test_smoothing_changes_nothing_where_the_strain_is_uniform():
+    """Nodal means of equal rates are the rates; without water, weight, walls and lining, of a block that shrinks."""
+    blocks = []
+    for smoothing in (True, False):
+        case = scene(gravity=0.0, gate=None, tunnels=(), water=None, stop=mpm.scene.Stop(time=1.0))
+        case = case.model_copy(
+            update={"numerics": case.numerics.model_copy(update={"volumetric_smoothing": smoothing, "pic_rate": 0.0})}
+        )
+        solver = mpm.Solver(case, mpm.build_mesh(case), threads=1)
+        solver.fixed[:] = 0
+        rows = solver.points
+        rows[:, [SXX, SYY, SZZ]] = -1e5
+        rows[:, VSX], rows[:, VSY] = -1e-2 * rows[:, X], -2e-2 * rows[:, Y]
+        solver.step(1e-5)
+        inside = (np.abs(rows[:, X]) < 40) & (rows[:, Y] < -10) & (rows[:, Y] > -40)  # away from the free edges
+        blocks.append(rows[inside].copy())
+    with_means, without = blocks
+    strained = np.abs(without[:, SXX] + 1e5).max()
+    assert strained > 1.0
+    # nodal velocities are means over the points around a node, which lie unevenly: the rates differ by some 1e-4
+    assert np.abs(with_means[:, STRESS] - without[:, STRESS]).max() < 1e-3 * strained
+
+
+def test_undrained_ground_needs_no_smaller_step_and_is_the_limit_of_falling_permeability():
+    soil = scene().soils[0]
+    states = [
+        stepped(scene(soils=(soil.model_copy(update={"hydraulic_conductivity": k}),)), steps=30) for k in (1e-9, 1e-12)
+    ]
+    for state in states:
+        apart = np.hypot(state.points[:, VSX] - state.points[:, VLX], state.points[:, VSY] - state.points[:, VLY])
+        moved = np.hypot(state.points[:, VSX], state.points[:, VSY]).max()
+        assert moved > 1e-3 and apart.max() < 1e-3 * moved  # one velocity, though two are carried
+    low, lower = (state.points for state in states)
+    assert np.abs(low[:, P] - lower[:, P]).max() < 1e-3 * lower[:, P].max()
+    steps = [state.time_step_estimate()[0] for state in states]
+    assert steps[0] == pytest.approx(steps[1], rel=0.02)  # the spectrum is known to a hundredth
+
+
+def test_pressures_only_keeps_pressures_and_history_and_changes_no_bit_of_them(tmp_path):
+    settings = {"stop": {"time": 0.02}, "ring": "none"}
+    output = {"interval": 0.005, "snapshot_interval": 0.005}
+    runs = []
+    for points in (True, False):
+        case = small_scene(**settings, output={**output, "points": points})
+        folder = tmp_path / str(points)
+        coupling.run(case, out=folder, threads=1, figures=not points)
+        runs.append(folder)
+    for group in ("lining", "history"):
+        one, other = (coupling.datasets.raw_groups(folder)[group] for folder in runs)
+        for name in one.keys() - {"cpu_seconds"}:
+            assert np.array_equal(one[name], other[name]), name
+    kept, none = (coupling.datasets.read_points(folder) for folder in runs)
+    assert kept.sizes["time"] > 2 and none.sizes["time"] == 0
+    assert (runs[1] / "run.nc").stat().st_size < (runs[0] / "run.nc").stat().st_size
+    pictures = {path.name for path in (runs[1] / "figures").iterdir()}
+    assert "pressures.png" in pictures and "fields.png" not in pictures

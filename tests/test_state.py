@@ -17,6 +17,7 @@ BUILT = {
     "_closed", "_pool", "_node_cuts", "_solve_nodes", "_advance_points", "_remap_nodes", "_rates", "_update",
     "_relocate_points", "_water_density", "_water_modulus", "start", "order", "occupied", "n_occupied", "n_active",
     "_element_cuts", "_row_cuts", "_points_up_to", "levels",
+    "copies", "mirror_line", "mirror_rows",
 }  # fmt: skip
 #: Written by each step before it is read.
 SCRATCH = {"ahead", "tied_means", "momenta", "nodal_means", "status", "rates", "_spare", "_moved"}

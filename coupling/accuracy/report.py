@@ -18,21 +18,21 @@ READING = """
 - **Where theory is smooth the orders are its own**: two for waves, vibrations and the lining's pressures over mesh
   size, one for rotation and flight over the time step, one for consolidation from a jump.
 - **`courant = 0.8`.** Shorter steps make flight, sliding and the active wall more accurate, all below half a percent
-  anyway, and nothing else; 0.2 costs four times as much. Waves are even better with 1.0, the sliding block three times
-  worse.
-- **`pressure_filter = 0.4`.** Without it consolidation errs by 1.3 % of the load instead of 0.1 %, radial seepage by 2 %
-  instead of 0.4 %. Between 0.1 and 0.4 nothing changes, so it is no diffusion.
-- **`volumetric_smoothing`** lets bearing capacity come down to Prandtl's (1.9 % instead of 6.8 %) and sand out of a slot
-  (12 % instead of 23 %); waves would rather do without (0.5 % instead of 0.7 %).
-- **`pic_rate = 10`** per second is best for the collapse of sand; 100 triples its error and that of the slot, but splashing
-  water would rather have 100. It costs nothing either way.
-- **Off the front.** Where a coarser mesh beats the default (walls, trapdoor, water column) errors of opposite sign cancel
-  on it; more elements do not make these errors smaller, since the references idealise (a front without thickness, slip
-  planes where the soil has a shear band). Fewer points an element are cheaper in flows and let the material run into
-  itself, which the norm does not see.
-- **What does not converge.** Collapses into the open (column, dam, water column) stay at 8 to 11 % of their references,
-  and so does the water's mass in the closed box: points carry the water of their pores, and what seeps from point to
-  point follows from divergences. In case 3 that loss is 4e-5 of all water.
+  anyway, and nothing else; 0.2 costs four times as much. Waves are even better with 1.0, the sliding block three
+  times worse.
+- **`pressure_filter = 0.4`.** Without it consolidation errs by 1.3 % of the load instead of 0.1 %, radial seepage by
+  2 % instead of 0.4 %. Between 0.1 and 0.4 nothing changes, so it is no diffusion.
+- **`volumetric_smoothing`** lets bearing capacity come down to Prandtl's (1.9 % instead of 6.8 %) and sand out of a
+  slot (12 % instead of 23 %); waves would rather do without (0.5 % instead of 0.7 %).
+- **`pic_rate = 10`** per second is best for the collapse of sand; 100 triples its error and that of the slot, but
+  splashing water would rather have 100. It costs nothing either way.
+- **Off the front.** Where a coarser mesh beats the default (walls, trapdoor, water column) errors of opposite sign
+  cancel on it; more elements do not make these errors smaller, since the references idealise (a front without
+  thickness, slip planes where the soil has a shear band). Fewer points an element are cheaper in flows and let the
+  material run into itself, which the norm does not see.
+- **What does not converge.** Collapses into the open (column, dam, water column) stay at 8 to 11 % of their
+  references, and so does the water's mass in the closed box: points carry the water of their pores, and what seeps
+  from point to point follows from divergences. In case 3 that loss is 4e-5 of all water.
 """
 
 
