@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from structure.balance import refuse_unbalanced
 from structure.beam_geometry import RingMesh
-from structure.continuum_bolts import Bolts, bolt_elongation, bolt_shares, check_bolts, near_anchors
+from structure.continuum_bolts import Bolts, anchor_place, bolt_elongation, bolt_shares, check_bolts, near_anchors
 from structure.continuum_equilibrium import SpringEquilibrium
 from structure.continuum_face import spring_feelers, traction_operator
 from structure.continuum_mesh import EDGE_MEAN, ContinuumMesh, GasketGroove, Opening
@@ -90,7 +90,9 @@ class ContinuumLining(LiningModel):
             check_bolts(ring, bolts)
         self.ring, self.joint, self.opening, self.groove, self.bolts = ring, joint, opening, groove, bolts
         width = strip_width if joint == "equivalent_strip" else 0.0
-        self.mesh = ContinuumMesh(ring, columns, layers, width, opening, groove)
+        # A strip's faces stand apart, so its anchors meet no line offset from them.
+        anchor = anchor_place(ring, bolts)[0] if bolts is not None and width == 0 else None
+        self.mesh = ContinuumMesh(ring, columns, layers, width, opening, groove, anchor)
         self._grid = RingMesh(ring)
         order = np.argsort(np.degrees(self._grid.mid_angle) % 360)
         self._theta, self._span = self._grid.mid_angle[order] % (2 * np.pi), self._grid.span[order]

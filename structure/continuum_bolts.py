@@ -37,7 +37,7 @@ def check_bolts(ring: Ring, bolts: Bolts):
             f"bolts: offset must lie within half the thickness {ring.thickness / 2:g} m, got {bolts.offset:g} m;"
             " it counts outward from the centre line"
         )
-    half_angle, radius = _anchor(ring, bolts)
+    half_angle, radius = anchor_place(ring, bolts)
     if radius > ring.outer_radius:
         raise ValueError(
             f"bolts: anchors must lie inside the concrete, below {ring.outer_radius:g} m from the axis, got"
@@ -60,7 +60,7 @@ def bolt_elongation(ring: Ring, mesh: ContinuumMesh, bolts: Bolts) -> sparse.csr
     ValueError
         An anchor lies in the open gate.
     """
-    half_angle, radius = _anchor(ring, bolts)
+    half_angle, radius = anchor_place(ring, bolts)
     joint = np.radians(ring.joint_angles)
     n_unknowns = 2 * mesh.n_lines * mesh.n_levels
     elongation = sparse.csr_array((len(joint), n_unknowns))
@@ -88,7 +88,7 @@ def bolt_elongation(ring: Ring, mesh: ContinuumMesh, bolts: Bolts) -> sparse.csr
 
 def bolt_shares(ring: Ring, bolts: Bolts, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """N, Q and M of whole sections at theta [rad] from the pull of the bolts they cut, (n_theta, n_joints) each."""
-    half_angle, _ = _anchor(ring, bolts)
+    half_angle, _ = anchor_place(ring, bolts)
     lean = (theta[:, None] - np.radians(ring.joint_angles) + np.pi) % (2 * np.pi) - np.pi
     cut = np.abs(lean) < half_angle
     from_axis = (ring.centre_radius + bolts.offset) / np.cos(np.where(cut, lean, 0.0))
@@ -98,12 +98,12 @@ def bolt_shares(ring: Ring, bolts: Bolts, theta: np.ndarray) -> tuple[np.ndarray
 
 def near_anchors(ring: Ring, bolts: Bolts, angle: np.ndarray, distance: float) -> np.ndarray:
     """Whether an anchor lies within a distance [rad] of angles [rad], (n,) bool: its pull is concentrated there."""
-    half_angle, _ = _anchor(ring, bolts)
+    half_angle, _ = anchor_place(ring, bolts)
     lean = np.abs((angle[:, None] - np.radians(ring.joint_angles) + np.pi) % (2 * np.pi) - np.pi)
     return (np.abs(lean - half_angle) < distance).any(axis=1)
 
 
-def _anchor(ring: Ring, bolts: Bolts) -> tuple[float, float]:
+def anchor_place(ring: Ring, bolts: Bolts) -> tuple[float, float]:
     """Angle [rad] from the joint, and distance from the axis [m], of either anchor."""
     from_axis, half = ring.centre_radius + bolts.offset, bolts.length / 2
     return float(np.arctan2(half, from_axis)), float(np.hypot(half, from_axis))

