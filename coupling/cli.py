@@ -138,35 +138,53 @@ def plan_command(scene: SceneName, threads: Threads = None, json_path: JsonPath 
 @app.command("respond")
 def respond_command(
     run: Annotated[Path, typer.Argument(help=SOURCE)],
-    backend: Annotated[str, typer.Option(help="Lining model: beam-spring, continuum, or a registered one.")] = (
-        "beam-spring"
-    ),
+    backend: Annotated[
+        str, typer.Option(help="Lining model: beam-spring, continuum, an installed one, or yours as FILE.py:CLASS.")
+    ] = "beam-spring",
     scene: RingScene = None,
+    limits: Annotated[
+        Path | None, typer.Option(help="TOML file of structure.Limits: checks the response and draws its utilisations.")
+    ] = None,
     json_path: JsonPath = None,
 ):
     """Compute the ring's response to the pressures of a run, and store it with them as /structure/BACKEND.
 
-    JSON: keys of `coupling.summary.summarise_response`, and `run`, `backend`.
+    JSON: keys of `coupling.summary.summarise_response`, and `run`, `backend`; with --limits `utilisations` (largest of
+    every check, 1 is its limit) and `figure` (path).
     """
     with failures(), checked_json(json_path):
+        from coupling.checked_response import draw_checks, read_limits, with_checks
         from coupling.datasets import write_response
         from coupling.pressure_source import read_source
         from coupling.run import respond_by_name
         from coupling.summary import summarise_response
 
         source = read_source(run, scene)
+        given = None if limits is None else read_limits(limits)
         response = respond_by_name(source.ring, source.pressures, backend)
-        write_response(source.file, response, backend)
-        data = {"run": str(run), "backend": backend, **summarise_response(response)}
+        name = backend.rpartition(":")[2]
+        data = {"run": str(run), "backend": name, **summarise_response(response)}
+        if given is not None:
+            response, data["utilisations"] = with_checks(response, given)
+        write_response(source.file, response, name)
+        if given is not None:
+            data["figure"] = draw_checks(response, source.file, name)
         write_json(json_path, data)
         if str(json_path) != "-":
-            Console().print(_response_table(data))
+            console = Console()
+            console.print(_response_table(data))
+            if given is not None:
+                shares = ", ".join(
+                    f"{check.replace('_', ' ')} {share:.2f}" for check, share in data["utilisations"].items()
+                )
+                console.print(f"largest of its limit: {shares}", highlight=False)
+                console.print(f"picture in {data['figure']}", highlight=False, soft_wrap=True)
 
 
 @app.command("compare")
 def compare_command(
     run: Annotated[Path, typer.Argument(help=SOURCE)],
-    first: Annotated[str, typer.Option(help="Lining model.")] = "beam-spring",
+    first: Annotated[str, typer.Option(help="Lining model, as for gush respond.")] = "beam-spring",
     second: Annotated[str, typer.Option(help="Lining model that is compared with it.")] = "continuum",
     open_gate: Annotated[
         float | None,

@@ -53,7 +53,7 @@ def compare(source, first="beam-spring", second="continuum", open_gate=None):
     ----------
     source : coupling.pressure_source.Source
     first, second : str
-        Names of lining models, see :func:`structure.lining_model_names`.
+        Lining models, see :func:`structure.lining_model`; a class in a file goes by the name of the class.
     open_gate : float, optional
         Cut the gate's opening out of the ring of "continuum" over this share of the tunnel's length; its angle and
         width come from the pressures' attributes.
@@ -74,13 +74,14 @@ def compare(source, first="beam-spring", second="continuum", open_gate=None):
     """
     from coupling.run import respond_by_name
 
+    places, (first, second) = (first, second), (model.rpartition(":")[2] for model in (first, second))
     if first == second:
         raise RunRefused(f"compare: models must differ, got {first!r} twice; choose another --first or --second")
     responses, seconds = {}, {}
-    for name in (first, second):
+    for place, name in zip(places, (first, second), strict=True):
         options = _gate_options(source, open_gate) if open_gate is not None and name == "continuum" else {}
         begin = clock.process_time()
-        responses[name] = respond_by_name(source.ring, source.pressures, name, **options)
+        responses[name] = respond_by_name(source.ring, source.pressures, place, **options)
         seconds[name] = clock.process_time() - begin
     if open_gate is not None and "continuum" not in responses:
         raise RunRefused("compare: an open gate needs the continuum model, got none; choose it as --second")

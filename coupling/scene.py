@@ -278,17 +278,35 @@ def _messages(
 ) -> list[str]:
     """One line a mistake: where, rule, value, remedy."""
     lines = []
+    missing: dict[tuple[Any, ...], list[str]] = {}
     for item in error.errors():
-        if item["type"] == "missing" and item["loc"][-1] in silent:
+        if item["type"] == "missing":
+            if item["loc"][-1] not in silent:
+                missing.setdefault(item["loc"][:-1], []).append(str(item["loc"][-1]))
             continue
         if item["type"] == "too_short" and item["input"]:
             # Only the echo of the mistakes inside its entries.
             continue
-        where = prefix
-        for part in item["loc"]:
-            where += f"[{part}]" if isinstance(part, int) else f"{'.' * bool(where)}{part}"
+        where = _where(item["loc"], prefix)
         lines.append(f"{where}: {_message(item, model, extra_names)}" if where else _message(item, model, extra_names))
+    for table, names in missing.items():
+        where = _where(table, prefix)
+        # A soil is where newcomers change one number and lose the others.
+        whole = (
+            f"; [[{table[0]}]] replaces all {table[0]} of the base, so copy all keys of it" if len(table) > 1 else ""
+        )
+        them = "it decides the answer and has" if len(names) == 1 else "they decide the answer and have"
+        lines.append(
+            f"{where}{': ' if where else ''}{', '.join(names)} missing; {them} no default, see the built-in case-3 for"
+            f" an example{whole}"
+        )
     return lines
+
+
+def _where(location: tuple[Any, ...], prefix: str) -> str:
+    for part in location:
+        prefix += f"[{part}]" if isinstance(part, int) else f"{'.' * bool(prefix)}{part}"
+    return prefix
 
 
 def _message(item: Any, model: type[BaseModel], extra_names: tuple[str, ...]) -> str:
@@ -297,8 +315,6 @@ def _message(item: Any, model: type[BaseModel], extra_names: tuple[str, ...]) ->
         here = [*_names_at(model, item["loc"][:-1]), *(extra_names if len(item["loc"]) == 1 else ())]
         near = difflib.get_close_matches(str(item["loc"][-1]), here, 1)
         return f"unknown key, got {value!r}; " + (f"did you mean {near[0]!r}?" if near else f"known: {', '.join(here)}")
-    if kind == "missing":
-        return "missing; it decides the answer and has no default, see the built-in case-3 for an example"
     message = item["msg"].removeprefix("Value error, ")
     if kind == "value_error":
         return message

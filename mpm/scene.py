@@ -11,7 +11,7 @@ from functools import cache, cached_property
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator, model_validator
 
 
 @cache
@@ -88,22 +88,32 @@ class Soil(Part):
     hydraulic_conductivity: Velocity | None = None
     k0: float = Field(gt=0, lt=5)
 
+    @field_validator("porosity")
+    @classmethod
+    def _check_porosity(cls, porosity, given):
+        if not 0.05 < porosity < 0.9:
+            raise ValueError(
+                f"{_soil(given)}: porosity must lie in (0.05, 0.9), got {porosity:g}; give a fraction, not percent"
+            )
+        return porosity
+
+    @field_validator("hydraulic_conductivity")
+    @classmethod
+    def _check_conductivity(cls, conductivity, given):
+        if conductivity is not None and not 0 < conductivity <= 10:
+            raise ValueError(
+                f"{_soil(given)}: hydraulic_conductivity must lie in (0, 10] m/s, got {conductivity:g}; "
+                "give the Darcy conductivity in m/s, sand about 1e-4"
+            )
+        return conductivity
+
     @model_validator(mode="after")
     def _check(self):
         who = f"soil '{self.name}'"
-        if not 0.05 < self.porosity < 0.9:
-            raise ValueError(
-                f"{who}: porosity must lie in (0.05, 0.9), got {self.porosity:g}; give a fraction, not percent"
-            )
         if not self.porosity < self.loose_porosity <= 0.9:
             raise ValueError(
                 f"{who}: loose_porosity (above it grains do not touch) must lie between porosity "
                 f"{self.porosity:g} and 0.9, got {self.loose_porosity:g}"
-            )
-        if self.hydraulic_conductivity is not None and not 0 < self.hydraulic_conductivity <= 10:
-            raise ValueError(
-                f"{who}: hydraulic_conductivity must lie in (0, 10] m/s, got {self.hydraulic_conductivity:g}; "
-                "give the Darcy conductivity in m/s, sand about 1e-4"
             )
         if self.dilatancy_angle > self.friction_angle:
             raise ValueError(
@@ -113,6 +123,11 @@ class Soil(Part):
         if self.model == "mohr-coulomb" and self.friction_angle == 0 and self.cohesion == 0:
             raise ValueError(f"{who}: friction_angle and cohesion are both 0: no strength at all; give one of them")
         return self
+
+
+def _soil(given) -> str:
+    """The soil of a field that is checked, by its name where that is known by then."""
+    return f"soil '{given.data['name']}'" if "name" in given.data else "soil"
 
 
 class Tunnel(Part):

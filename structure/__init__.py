@@ -18,6 +18,8 @@ _HOMES = {
     "BeamSpringLining": "structure.beam_spring",
     "ContinuumLining": "structure.continuum",
     "Opening": "structure.continuum_mesh",
+    "GasketGroove": "structure.continuum_mesh",
+    "Bolts": "structure.continuum_bolts",
     "lining_model": "structure.models",
     "lining_model_names": "structure.models",
     "register_lining_model": "structure.models",

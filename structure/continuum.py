@@ -10,9 +10,10 @@ from threadpoolctl import threadpool_limits
 
 from structure.balance import refuse_unbalanced
 from structure.beam_geometry import RingMesh
+from structure.continuum_bolts import Bolts, anchor_place, bolt_elongation, bolt_shares, check_bolts, near_anchors
 from structure.continuum_equilibrium import SpringEquilibrium
 from structure.continuum_face import spring_feelers, traction_operator
-from structure.continuum_mesh import EDGE_MEAN, ContinuumMesh, Opening
+from structure.continuum_mesh import EDGE_MEAN, ContinuumMesh, GasketGroove, Opening
 from structure.continuum_sections import section_displacements, section_forces
 from structure.continuum_stiffness import Concrete, joint_operators, joint_stiffness, nodes_from_unknowns
 from structure.equilibrium import NoEquilibrium
@@ -26,6 +27,8 @@ STRESSES = {
     "stress_tt": ("Pa", "hoop stress in the lining, tension positive"),
     "stress_rt": ("Pa", "shear stress in the lining, positive where it turns a radius clockwise outside"),
 }
+#: Units and long name of the one variable beyond the schema of all models.
+BOLT_FORCE = {"units": "N m-1", "long_name": "force in the bolts of a joint per metre of tunnel, tension positive"}
 
 
 class ContinuumLining(LiningModel):
@@ -49,6 +52,13 @@ class ContinuumLining(LiningModel):
     opening : Opening or tuple of float, optional
         Angle [degree], width [m] and cut share of the open gate. In a slot (cut = 1, the default) there is no lining;
         N, Q, M and displacements there are NaN.
+    groove : GasketGroove or tuple of float, optional
+        Cover, height and depth [m] of the gasket's groove in both faces of every joint. The segments touch above and
+        below it; the three stiffnesses of the joint stay those of the ring, the concrete beside it gets softer.
+    bolts : Bolts or tuple of float, optional
+        Offset, length [m] and stiffness [N/m per m] of bolts across every joint, besides its own springs. N, Q and M of
+        sections and joints contain what the bolts carry; the response has ``joint_bolt_force``. They are elastic and
+        two-way.
 
     Notes
     -----
@@ -66,13 +76,23 @@ class ContinuumLining(LiningModel):
         joint: Literal["zero_thickness", "equivalent_strip"] = "zero_thickness",
         strip_width: float = 0.02,
         opening: Opening | tuple[float, float] | None = None,
+        groove: GasketGroove | tuple[float, float, float] | None = None,
+        bolts: Bolts | tuple[float, float, float] | None = None,
     ):
         opening = None if opening is None else Opening(*opening)
+        groove = None if groove is None else GasketGroove(*groove)
+        bolts = None if bolts is None else Bolts(*bolts)
         _refuse_unsupported(ring)
         _refuse_options(ring, columns, layers, joint, strip_width, opening)
-        self.ring, self.joint, self.opening = ring, joint, opening
+        if groove is not None:
+            _check_groove(ring, joint, groove)
+        if bolts is not None:
+            check_bolts(ring, bolts)
+        self.ring, self.joint, self.opening, self.groove, self.bolts = ring, joint, opening, groove, bolts
         width = strip_width if joint == "equivalent_strip" else 0.0
-        self.mesh = ContinuumMesh(ring, columns, layers, width, opening)
+        # A strip's faces stand apart, so its anchors meet no line offset from them.
+        anchor = anchor_place(ring, bolts)[0] if bolts is not None and width == 0 else None
+        self.mesh = ContinuumMesh(ring, columns, layers, width, opening, groove, anchor)
         self._grid = RingMesh(ring)
         order = np.argsort(np.degrees(self._grid.mid_angle) % 360)
         self._theta, self._span = self._grid.mid_angle[order] % (2 * np.pi), self._grid.span[order]
@@ -97,7 +117,17 @@ class ContinuumLining(LiningModel):
         feel, area = spring_feelers(ring, self.mesh)
         levels = np.arange(2 * self.mesh.n_levels)
         place = (2 * self.mesh.n_levels * self.mesh.neighbour_place()[:, None] + levels).ravel()
-        self._equilibrium = SpringEquilibrium(ring, stiffness, feel @ self._to_nodes, area, place, self._held())
+        self._elongation = None if bolts is None else (bolt_elongation(ring, self.mesh, bolts) @ self._to_nodes).tocsr()
+        self._equilibrium = SpringEquilibrium(
+            ring,
+            stiffness,
+            feel @ self._to_nodes,
+            area,
+            place,
+            self._held(),
+            self._elongation,
+            0.0 if bolts is None else bolts.stiffness,
+        )
         fine = np.radians(np.arange(0, 360, 0.5))
         lift = traction_operator(ring, self.mesh, fine)[0] @ np.cos(fine)
         self._unit_balance = lift / self._resultant(lift)[1]
@@ -118,12 +148,15 @@ class ContinuumLining(LiningModel):
         unknowns, loads, balanced = self._solve(ordered)
         displacements = (self._to_nodes @ unknowns.T).T
         fields = {"balanced_uplift": balanced}
-        fields |= self._internal_forces(displacements)
+        fields |= self._internal_forces(unknowns, displacements)
         fields |= self._joint_fields(unknowns)
         fields |= self._balances(unknowns, loads)
         fields["shear_moment_residual"] = self._shear_moment_residual(fields, ordered, unknowns)
         fields |= self._movements(displacements)
-        return self._dataset(pressures, fields, times)
+        response = self._dataset(pressures, fields, times)
+        if self.bolts is not None:
+            response["joint_bolt_force"] = ("time", "joint"), self._bolt_force(unknowns), BOLT_FORCE
+        return response
 
     def stress_field(self, pressures: xr.Dataset) -> xr.Dataset:
         """Stresses in the concrete at two by two points of every element.
@@ -216,11 +249,17 @@ class ContinuumLining(LiningModel):
         lever = self.mesh.node_radius / self.ring.centre_radius
         return np.stack([radial @ sine + tangential @ cosine, radial @ cosine - tangential @ sine, tangential @ lever])
 
-    def _internal_forces(self, displacements):
+    def _internal_forces(self, unknowns, displacements):
         names = ("axial_force", "shear_force", "bending_moment")
-        return {
-            name: self._where_solid((part @ displacements.T).T) for name, part in zip(names, self._forces, strict=True)
-        }
+        forces = [(part @ displacements.T).T for part in self._forces]
+        if self.bolts is not None:
+            pull = self._bolt_force(unknowns)
+            shares = bolt_shares(self.ring, self.bolts, self._theta)
+            forces = [force + pull @ share.T for force, share in zip(forces, shares, strict=True)]
+        return dict(zip(names, map(self._where_solid, forces), strict=True))
+
+    def _bolt_force(self, unknowns):
+        return self.bolts.stiffness * (self._elongation @ unknowns.T).T
 
     def _where_solid(self, values):
         values[:, ~self._solid] = np.nan
@@ -232,6 +271,9 @@ class ContinuumLining(LiningModel):
         forces = [-spring.normal * opening, spring.shear * dislocation, spring.rotation * rotation]
         if self.joint == "equivalent_strip":
             forces = [(part @ unknowns.T).T for part in self._strip_forces]
+        if self.bolts is not None:
+            pull = self._bolt_force(unknowns)
+            forces[0], forces[2] = forces[0] - pull, forces[2] + self.bolts.offset * pull
         names = ("joint_axial_force", "joint_shear_force", "joint_bending_moment")
         return {
             "joint_opening": opening,
@@ -289,6 +331,8 @@ class ContinuumLining(LiningModel):
         if ring.support == "invert":
             # The clamp's own reaction is concentrated there, on both sides of its line.
             gap[:, np.abs(middle % (2 * np.pi) - np.pi) < 2 * span.max()] = 0
+        if self.bolts is not None:
+            gap[:, near_anchors(ring, self.bolts, middle, 3 * span.max())] = 0
         return np.nanmax(gap, axis=1)
 
     def _node_share(self):
@@ -348,6 +392,9 @@ class ContinuumLining(LiningModel):
         if self.opening is not None:
             attributes |= {"opening_angle": float(self.opening.angle), "opening_width": float(self.opening.width)}
             attributes["opening_cut"] = float(self.opening.cut)
+        for name, detail in (("groove", self.groove), ("bolts", self.bolts)):
+            if detail is not None:
+                attributes[name] = ", ".join(f"{part} {value:g}" for part, value in detail._asdict().items())
         if self.ring.ground is not None:
             normal, tangential = limit_pressures(self.ring.ground)
             attributes["limit_pressures"] = f"normal {normal:.6g} Pa, tangential {tangential:.6g} Pa"
@@ -414,4 +461,22 @@ def _refuse_options(ring, columns, layers, joint, strip_width, opening):
         raise ValueError(
             f"opening: width must be above 0 and below a quarter of the inner diameter"
             f" ({ring.inner_diameter / 4:g} m), got {opening.width:g} m; the gate of the built-in scenes is 0.2 m wide"
+        )
+
+
+def _check_groove(ring: Ring, joint: str, groove: GasketGroove):
+    if not ring.joint_angles:
+        raise ValueError("groove: the ring must have joints, got none; leave groove out, or give joint_angles")
+    if joint != "zero_thickness":
+        raise ValueError(f"groove: joint must be 'zero_thickness', got {joint!r}; a strip has no faces to cut into")
+    if min(groove) <= 0 or groove.cover + groove.height >= ring.thickness:
+        raise ValueError(
+            f"groove: cover, height and depth must be above 0, cover + height below the thickness {ring.thickness:g} m,"
+            f" got {groove.cover:g}, {groove.height:g}, {groove.depth:g} m; cover counts from the outer face"
+        )
+    room = np.radians(min(ring.segment_angles)) * ring.centre_radius
+    if groove.depth >= room / 4:
+        raise ValueError(
+            f"groove: depth must be below a quarter of the shortest segment ({room / 4:.3g} m), got {groove.depth:g} m;"
+            " it counts into the segment"
         )

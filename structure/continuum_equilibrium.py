@@ -30,11 +30,20 @@ class SpringEquilibrium:
         Place of each unknown in the band.
     held : (n_held,) int
         Unknowns held at zero.
+    ties : (n_ties, n) sparse, optional
+        Elongation of springs between places far apart, which would widen the band: they join in as a low-rank update
+        of its factors (Woodbury).
+    tie_stiffness : float
+        Of each [N/m per m].
     """
 
-    def __init__(self, ring: Ring, stiffness, feel, area, place: np.ndarray, held: np.ndarray):
+    def __init__(
+        self, ring: Ring, stiffness, feel, area, place: np.ndarray, held: np.ndarray, ties=None, tie_stiffness=0.0
+    ):
         self.largest = LARGEST_DISPLACEMENT * ring.outer_radius
-        self.stiffness, self.magnitudes = stiffness, abs(stiffness)
+        self.ties, self.tie_stiffness = ties, tie_stiffness
+        whole = stiffness if ties is None else (stiffness + tie_stiffness * (ties.T @ ties)).tocsr()
+        self.stiffness, self.magnitudes = whole, abs(whole)
         self.held, self.place = held, place
         self.springs = soil_springs(ring) if ring.ground is not None else None
         self.feel, self.area = feel, area
@@ -51,6 +60,9 @@ class SpringEquilibrium:
         np.add.at(self.band, constant[:2], constant[2])
         self.band[0, place[held]] = stiffness.diagonal().max()
         self._factor = None
+        if ties is not None:
+            self._tied = np.zeros((stiffness.shape[0], ties.shape[0]), order="F")
+            self._tied[place] = (ties * free).T.toarray()
         if products is not None:
             below, column, value, spring = products
             where = np.ravel_multi_index((below, column), shape, order="F")
@@ -108,13 +120,19 @@ class SpringEquilibrium:
         diagonal = band[0].copy()
         self._factor, failed = lapack.dpbtrf(band, lower=1, overwrite_ab=1)
         if failed or np.min(self._factor[0] ** 2 / diagonal) < SMALLEST_PIVOT:
-            raise NoEquilibrium("the ring is a mechanism: joints too weak to hold it without more ground")
+            tied = "" if self.ties is None else " (its bolts left aside)"
+            raise NoEquilibrium(f"the ring is a mechanism{tied}: joints too weak to hold it without more ground")
         return self._factor
 
     def _direction(self, out_of_balance: np.ndarray, tangents: np.ndarray) -> np.ndarray:
         right = np.empty_like(out_of_balance)
         right[self.place] = out_of_balance
-        step, _ = lapack.dpbtrs(self._factorised(tangents), right, lower=1)
+        factor = self._factorised(tangents)
+        step, _ = lapack.dpbtrs(factor, right, lower=1)
+        if self.ties is not None:
+            by_tie, _ = lapack.dpbtrs(factor, self._tied, lower=1)
+            compliance = np.eye(self._tied.shape[1]) / self.tie_stiffness + self._tied.T @ by_tie
+            step = step - by_tie @ np.linalg.solve(compliance, self._tied.T @ step)
         return step[self.place]
 
     def solve(self, loads: np.ndarray, start: np.ndarray) -> np.ndarray:

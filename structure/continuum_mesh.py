@@ -8,6 +8,7 @@ clockwise, the nodes of a line outward; two lines at a zero-thickness joint shar
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +34,18 @@ class Opening(NamedTuple):
     cut: float = 1.0
 
 
+class GasketGroove(NamedTuple):
+    """A recess in both faces of every joint, as gaskets lie in; segments touch above and below it only.
+
+    cover : from the outer face to its nearer edge [m];  height : along the face [m];  depth : into either segment, on
+    the centre line [m].
+    """
+
+    cover: float
+    height: float
+    depth: float
+
+
 class Boundary(NamedTuple):
     """What separates two bodies of concrete: its angle [rad], width [m], and whether material could fill it."""
 
@@ -54,9 +67,17 @@ class ContinuumMesh:
     strip_width : float
         [m]; 0 for zero-thickness joints, else each joint is a column of this width.
     opening : Opening or None
+    groove : GasketGroove or None
+        Its edges become lines of the mesh, with at least `layers` elements across the thickness.
+    anchor_angle : float or None
+        Angle of anchors from their joint [rad]: lines too, so that their force enters between columns, not inside one.
 
     Attributes
     ----------
+    layers : int
+        Elements across the thickness.
+    layer_height : (layers,) float64
+        [m].
     radius : (n_levels,) float64
         Of the nodes of a line, n_levels = 2 layers + 1 [m].
     level_mean : (n_levels,) float64
@@ -68,6 +89,8 @@ class ContinuumMesh:
     column_is_strip : (n_columns,) bool
     column_share : (n_columns,) float64
         Share of the tunnel's length that is lined: 1 but for what bridges a hole.
+    is_groove : (n_columns, layers) bool
+        Elements without concrete.
     joint_before, joint_after : (n_joints,) int
         Lines on the counter-clockwise and on the clockwise side of each joint, in the order of the ring's joints.
 
@@ -77,27 +100,42 @@ class ContinuumMesh:
         Bodies without room for concrete: joints or opening too close to each other.
     """
 
-    def __init__(self, ring: Ring, columns: int, layers: int, strip_width: float = 0.0, opening: Opening | None = None):
-        self.radius = np.linspace(ring.inner_diameter / 2, ring.outer_radius, 2 * layers + 1)
+    def __init__(
+        self,
+        ring: Ring,
+        columns: int,
+        layers: int,
+        strip_width: float = 0.0,
+        opening: Opening | None = None,
+        groove: GasketGroove | None = None,
+        anchor_angle: float | None = None,
+    ):
+        edges = _layer_edges(ring, layers, groove)
+        self.layer_height = np.diff(edges)
+        self.layers = layers = len(self.layer_height)
+        self.radius = np.interp(np.arange(2 * layers + 1) / 2, np.arange(layers + 1), edges)
         self.level_mean = np.zeros(2 * layers + 1)
-        for layer in range(layers):
-            self.level_mean[2 * layer : 2 * layer + 3] += EDGE_MEAN / layers
-        self.layers = layers
+        for layer, height in enumerate(self.layer_height):
+            self.level_mean[2 * layer : 2 * layer + 3] += EDGE_MEAN * height / ring.thickness
+        self._centre_radius = ring.centre_radius
+        self._groove_span = 0.0 if groove is None else groove.depth / ring.centre_radius
+        self._line_offsets = [offset for offset in (self._groove_span, anchor_angle) if offset]
         boundaries = self._boundaries(ring, strip_width, opening)
         bridge = 0.0 if opening is None else 1 - opening.cut
-        angles, column_lines, strips, shares, before, after = [], [], [], [], [], []
+        angles, column_lines, strips, shares, before, after, grooved = [], [], [], [], [], [], []
         closed = not boundaries
         for index, (start, end) in enumerate(self._bodies(boundaries)):
             first = sum(map(len, angles))
-            count = max(1, round((end - start) / (2 * np.pi) * columns))
-            body = np.linspace(start, end, 2 * count + 1)
+            at_joint = [not closed and boundaries[(index + k) % len(boundaries)].is_joint for k in (0, 1)]
+            body = self._body_lines(start, end, columns, at_joint)
+            count = len(body) // 2
             angles.append(body[:-1] if closed else body)
             counts = [count]
             if not closed:
                 boundary = boundaries[(index + 1) % len(boundaries)]
                 turn = 0 if index + 1 < len(boundaries) else 2 * np.pi
                 counts.append(int(strip_width > 0) if boundary.is_joint else BRIDGE_COLUMNS * (bridge > 0))
-                half = boundary.width / 2 / self.radius.mean()
+                half = boundary.width / 2 / ring.centre_radius
                 inside = np.linspace(-half, half, 2 * counts[1] + 1)[1:-1] if counts[1] else np.zeros(0)
                 angles.append(boundary.angle + turn + inside)
                 if boundary.is_joint:
@@ -107,14 +145,37 @@ class ContinuumMesh:
             fills_joint = not closed and boundary.is_joint
             strips += [False] * counts[0] + [fills_joint] * sum(counts[1:])
             shares += [1.0] * counts[0] + [1.0 if fills_joint else bridge] * sum(counts[1:])
+            beside = np.zeros(sum(counts), dtype=bool)
+            middle = body[1::2]
+            beside[:count] = at_joint[0] & (middle < start + self._groove_span)
+            beside[:count] |= at_joint[1] & (middle > end - self._groove_span)
+            grooved.append(beside)
         self.angle = np.concatenate(angles)
         self.n_lines, self.n_levels = len(self.angle), len(self.radius)
         self.column_lines = np.array(column_lines) % self.n_lines
         self.column_is_strip, self.column_share = np.array(strips), np.array(shares)
+        middle = ring.outer_radius - self.radius[1::2]
+        #: Layers of the groove, (layers,) bool.
+        self.groove_layers = np.zeros(layers, dtype=bool)
+        if groove is not None:
+            self.groove_layers = (middle > groove.cover) & (middle < groove.cover + groove.height)
+        self.is_groove = np.concatenate(grooved)[:, None] & self.groove_layers
         # The body after the first boundary comes first, so the joint at its start is met last.
         joints = np.argsort([self.angle[line] % (2 * np.pi) for line in np.array(after, dtype=int) % self.n_lines])
         self.joint_before = np.array(before, dtype=int)[joints]
         self.joint_after = np.array(after, dtype=int)[joints] % self.n_lines
+
+    def _body_lines(self, start: float, end: float, columns: int, at_joint: list[bool]) -> np.ndarray:
+        """Angles of the lines of a body, two per column and one more; anchors and the groove's ends lie on lines."""
+        inner = [start, end]
+        for offset in (offset for offset in self._line_offsets if offset < end - start):
+            inner += [start + offset] * at_joint[0] + [end - offset] * at_joint[1]
+        # Anchors of both ends may meet; lines closer than this are one.
+        corners = np.sort(inner)
+        corners = corners[np.append(True, np.diff(corners) > 1e-6)]
+        counts = np.maximum(1, np.rint(np.diff(corners) / (2 * np.pi) * columns)).astype(int)
+        parts = [np.linspace(corners[k], corners[k + 1], 2 * count + 1)[int(k > 0) :] for k, count in enumerate(counts)]
+        return np.concatenate(parts)
 
     @staticmethod
     def _boundaries(ring: Ring, strip_width: float, opening: Opening | None) -> list[Boundary]:
@@ -131,8 +192,8 @@ class ContinuumMesh:
         for index, boundary in enumerate(boundaries):
             following = boundaries[(index + 1) % len(boundaries)]
             turn = 0 if index + 1 < len(boundaries) else 2 * np.pi
-            start = boundary.angle + boundary.width / 2 / self.radius.mean()
-            end = following.angle + turn - following.width / 2 / self.radius.mean()
+            start = boundary.angle + boundary.width / 2 / self._centre_radius
+            end = following.angle + turn - following.width / 2 / self._centre_radius
             if end - start < np.radians(0.5):
                 raise ValueError(
                     f"ring: joints and opening must leave at least 0.5 degrees of concrete between them, got"
@@ -194,3 +255,14 @@ class ContinuumMesh:
         """(n_lines,) place of each line when the ring is folded flat, which closes it inside a narrow band."""
         line = np.arange(self.n_lines)
         return np.where(2 * line < self.n_lines, 2 * line, 2 * (self.n_lines - line) - 1)
+
+
+def _layer_edges(ring: Ring, layers: int, groove: GasketGroove | None) -> np.ndarray:
+    """Radii between the layers: even, but lines at the edges of the groove."""
+    inner, outer = ring.inner_diameter / 2, ring.outer_radius
+    corners = [inner, outer]
+    if groove is not None:
+        corners[1:1] = [outer - groove.cover - groove.height, outer - groove.cover]
+    counts = [max(1, round((b - a) / ring.thickness * layers)) for a, b in pairwise(corners)]
+    parts = [np.linspace(a, b, n + 1)[1:] for (a, b), n in zip(pairwise(corners), counts, strict=True)]
+    return np.concatenate([[inner], *parts])

@@ -43,12 +43,12 @@ def _section_integrals(mesh: ContinuumMesh, stresses: StressOperators, centre_ra
     point = np.arange(4 * layers * count).reshape(count, layers, 2, 2)
     # [column, place along, layer and place across]
     points = point.transpose(0, 3, 1, 2).reshape(2 * count, 2 * layers)
-    height = (mesh.radius[-1] - mesh.radius[0]) / (2 * layers)
+    height = np.broadcast_to(np.repeat(mesh.layer_height / 2, 2), points.shape)
     where = (np.repeat(np.arange(2 * count), 2 * layers), points.ravel())
     lever = stresses.radius[points] - centre_radius
     return tuple(
         sparse.coo_array((values.ravel(), where), shape=(2 * count, point.size)).tocsr()
-        for values in (np.full(points.shape, height), height * lever)
+        for values in (height, height * lever)
     )
 
 

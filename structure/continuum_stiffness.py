@@ -17,6 +17,8 @@ from structure.springs import joint_spring
 
 #: Reference places, along and across an element, where stresses of quadratic elements converge one order faster.
 STRESS_POINTS = (0.5 - 0.5 / np.sqrt(3), 0.5 + 0.5 / np.sqrt(3))
+#: Stiffness and weight of what fills a groove over those of concrete: it holds the nodes inside and nothing else.
+GROOVE_SHARE = 1e-6
 #: Integrals of products of the three shape functions of a quadratic edge of unit length.
 EDGE_MASS = np.array([[4, 2, -1], [2, 16, 2], [-1, 2, 4]]) / 30
 
@@ -69,7 +71,8 @@ class Concrete:
             shape=(self.n_unknowns, self.n_unknowns),
         ).tocsr()
         self._strip = np.repeat(mesh.column_is_strip, mesh.layers)
-        self._share = np.repeat(mesh.column_share, mesh.layers)
+        share = np.broadcast_to(mesh.column_share[:, None], mesh.is_groove.shape)
+        self._share = np.where(mesh.is_groove, GROOVE_SHARE, share).ravel()
         self._moduli = [self._share * modulus for modulus in _moduli(ring, self._strip, strip_width)]
 
     def _moduli_at(self, radius: np.ndarray) -> list[np.ndarray]:
@@ -215,50 +218,65 @@ class JointOperators(NamedTuple):
     rotation: sparse.csr_array
 
 
-def joint_operators(ring: Ring, mesh: ContinuumMesh) -> JointOperators:
-    """Movements of the clockwise face against the other one: means over the face, and the best fitting rotation.
-
-    The rotation is 12/t^3 times the integral of gap times (r - R); with it and the mean, the rest of the gap does no
-    work, so the section's laws N = -k_n opening, Q = k_s dislocation and M = k_theta rotation hold exactly.
-    """
-    offset = mesh.radius - ring.centre_radius
-    slope = np.zeros(mesh.n_levels)
-    height = ring.thickness / mesh.layers
-    for layer in range(mesh.layers):
+def _face_mass(mesh: ContinuumMesh) -> np.ndarray:
+    """Integrals of products of shape functions over the height on which the segments touch, (n_levels, n_levels)."""
+    mass = np.zeros((mesh.n_levels, mesh.n_levels))
+    for layer in np.flatnonzero(~mesh.groove_layers):
         nodes = slice(2 * layer, 2 * layer + 3)
-        slope[nodes] += 12 / ring.thickness**3 * height * EDGE_MASS @ offset[nodes]
-    opening = _face_jump(mesh, mesh.level_mean, 1)
+        mass[nodes, nodes] += mesh.layer_height[layer] * EDGE_MASS
+    return mass
+
+
+def _best_fit(ring: Ring, mesh: ContinuumMesh) -> tuple[np.ndarray, np.ndarray]:
+    """Gap on the centre line and rotation that fit the gap of a face best, from its nodes (2, n_levels), and the
+    matrix of the fit, the areas and moments of what touches (2, 2)."""
+    linear = np.stack([np.ones(mesh.n_levels), mesh.radius - ring.centre_radius])
+    moments = linear @ _face_mass(mesh)
+    matrix = moments @ linear.T
+    return np.linalg.solve(matrix, moments), matrix
+
+
+def joint_operators(ring: Ring, mesh: ContinuumMesh) -> JointOperators:
+    """Movements of the clockwise face against the other one: gap on the centre line and rotation that fit best, and
+    the mean dislocation.
+
+    Without a groove the gap is the mean over the face, the rotation 12/t^3 times the integral of gap times (r - R).
+    The rest of the gap does no work on them, so the section's laws N = -k_n opening, Q = k_s dislocation and
+    M = k_theta rotation hold exactly.
+    """
+    (gap, slope), matrix = _best_fit(ring, mesh)
+    mean = _face_mass(mesh).sum(0) / matrix[0, 0]
+    opening = _face_jump(mesh, gap, 1)
     rotation = _face_jump(mesh, slope, 1)
     # Faces apart slide past each other when the whole ring turns; that is no dislocation of the joint.
     turn = _face_jump(mesh, slope, 1, before=1.0) / 2
     width = ring.centre_radius * ((mesh.angle[mesh.joint_after] - mesh.angle[mesh.joint_before] + 1) % (2 * np.pi) - 1)
-    dislocation = -_face_jump(mesh, mesh.level_mean, 0) - sparse.diags_array(width) @ turn
+    dislocation = -_face_jump(mesh, mean, 0) - sparse.diags_array(width) @ turn
     return JointOperators(opening, dislocation.tocsr(), rotation)
 
 
 def joint_stiffness(ring: Ring, mesh: ContinuumMesh) -> sparse.csr_array:
     """Stiffness of zero-thickness joints, (n_unknowns, n_unknowns).
 
-    Springs k_n/t and k_s/t per area of the face alone would turn with k_n t^2/12. One rank-1 term in the rotation
-    brings the rest, k_theta - k_n t^2/12. Where that is negative the sum still stores no negative energy: it is
-    k_n opening^2 + k_theta rotation^2 plus what the springs store in the rest of the gap.
+    Springs k_n and k_s per height of what touches alone would turn with k_n t^2/12. Rank-1 terms in the gap on the
+    centre line and in the rotation bring the rest, so that the energy is k_n opening^2 + k_theta rotation^2 plus what
+    the springs store in the rest of the gap; it is never negative. Without a groove only the rotation needs one,
+    k_theta - k_n t^2/12.
     """
     n_unknowns = 2 * mesh.n_lines * mesh.n_levels
     spring = joint_spring(ring)
-    height = ring.thickness / mesh.layers
-    face = np.zeros((mesh.n_levels, mesh.n_levels))
-    for layer in range(mesh.layers):
-        nodes = slice(2 * layer, 2 * layer + 3)
-        face[nodes, nodes] += height / ring.thickness * EDGE_MASS
-    matrix = sparse.csr_array((n_unknowns, n_unknowns))
-    for direction, stiffness in ((1, spring.normal), (0, spring.shear)):
-        jumps = [_face_jump(mesh, row, direction) for row in np.eye(mesh.n_levels)]
-        for k, left in enumerate(jumps):
-            for m in np.flatnonzero(face[k]):
-                matrix = matrix + stiffness * face[k, m] * (left.T @ jumps[m])
-    rotation = joint_operators(ring, mesh).rotation
-    rest = spring.rotation - spring.normal * ring.thickness**2 / 12
-    return (matrix + rest * (rotation.T @ rotation)).tocsr()
+    mass = _face_mass(mesh)
+    fit, matrix = _best_fit(ring, mesh)
+    touching = matrix[0, 0]
+    normal = spring.normal / touching * (mass - fit.T @ matrix @ fit) + fit.T @ (
+        np.diag([spring.normal, spring.rotation]) @ fit
+    )
+    stiffness = sparse.csr_array((n_unknowns, n_unknowns))
+    for direction, face in ((1, normal), (0, spring.shear / touching * mass)):
+        jumps = sparse.vstack([_face_jump(mesh, row, direction) for row in np.eye(mesh.n_levels)]).tocsr()
+        spread = sparse.kron(face, sparse.eye_array(len(mesh.joint_before)))
+        stiffness = stiffness + jumps.T @ spread @ jumps
+    return stiffness.tocsr()
 
 
 def _face_jump(mesh: ContinuumMesh, weights: np.ndarray, direction: int, before: float = -1.0) -> sparse.csr_array:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import runpy
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -43,13 +45,15 @@ def lining_model(name: str) -> type[LiningModel]:
     Parameters
     ----------
     name : str
-        One of :func:`lining_model_names`.
+        One of :func:`lining_model_names`, or "FILE.py:CLASS", a class in a file of your own, which is run.
 
     Raises
     ------
     ValueError
-        No such model.
+        No such model, file or class.
     """
+    if ".py:" in name:
+        return _from_file(*name.rsplit(":", 1))
     if name in _REGISTERED:
         return _REGISTERED[name]
     if name in _BUILT_IN:
@@ -67,3 +71,22 @@ def _installed():
     from importlib.metadata import entry_points
 
     return entry_points(group=ENTRY_POINTS)
+
+
+def _from_file(file: str, class_name: str) -> type[LiningModel]:
+    from structure.lining import LiningModel
+
+    path = Path(file)
+    if not path.is_file():
+        raise ValueError(f"lining model '{file}:{class_name}': there is no file '{file}'; check the path")
+    try:
+        model = runpy.run_path(str(path)).get(class_name)
+    except Exception as problem:
+        raise ValueError(
+            f"lining model '{file}:{class_name}': the file fails with {type(problem).__name__}: {problem}; correct it"
+        ) from problem
+    if not (isinstance(model, type) and issubclass(model, LiningModel)):
+        raise ValueError(
+            f"lining model '{file}:{class_name}': must be a class derived from structure.LiningModel, got {model!r}"
+        )
+    return model

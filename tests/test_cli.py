@@ -135,7 +135,10 @@ def test_folder_that_cannot_be_made_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[[soils]]\nporosity = 45", "porosity"),
+        ("[[soils]]\nporosity = 45", "porosity must lie in (0.05, 0.9), got 45; give a fraction, not percent"),
+        ("[[soils]]\nporosity = 0.4", "replaces all soils of the base"),
+        ("[[soils]]\nname = 'sand'\nhydraulic_conductivity = -1e-4",
+         "soil 'sand': hydraulic_conductivity must lie in (0, 10] m/s, got -0.0001"),
         ("[gate]\nwidth = 5.0", "gate"),
         ("[[tunnels]]\nx = 60.0\ncover = 20.0\nouter_diameter = 6.6\ninner_diameter = 5.9\nfriction_coefficient = 0.2",
          "outside the box"),

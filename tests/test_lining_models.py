@@ -63,6 +63,66 @@ def test_example_of_the_documentation_is_a_model(example, written, tmp_path):
     assert json.loads(result.output)["models"] == ["beam-spring", "efficiency"]
 
 
+def test_model_in_a_file_of_your_own_answers_on_the_command_line(example, written, tmp_path, monkeypatch):
+    monkeypatch.setattr(models, "_REGISTERED", {})
+    code = re.search(r"## A model of your own.*?```python\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.S)[1]
+    file = tmp_path / "mine.py"
+    file.write_text(code)
+    result = gush("respond", written, "--backend", f"{file}:EfficiencyRing", "--json", "-")
+    assert result.exit_code == 0, result.output
+    expected = example(ring()).respond(xr.load_dataset(written, engine="h5netcdf"))
+    stored = xr.load_dataset(written, group="structure/EfficiencyRing", engine="h5netcdf")
+    np.testing.assert_array_equal(stored["bending_moment"], expected["bending_moment"])
+    monkeypatch.setattr(models, "_REGISTERED", {})
+    result = gush("compare", written, "--second", f"{file}:EfficiencyRing", "--json", "-")
+    assert json.loads(result.output)["models"] == ["beam-spring", "EfficiencyRing"]
+
+
+@pytest.mark.parametrize(
+    ("code", "name", "message"),
+    [
+        (None, "Mine", "there is no file"),
+        ("1/0", "Mine", "fails with ZeroDivisionError"),
+        ("class Mine: pass", "Mine", "derived from structure.LiningModel"),
+        ("", "Mine", "derived from structure.LiningModel"),
+    ],
+)
+def test_file_without_a_model_is_refused(written, tmp_path, code, name, message):
+    if code is not None:
+        (tmp_path / "mine.py").write_text(code)
+    result = gush("respond", written, "--backend", f"{tmp_path / 'mine.py'}:{name}")
+    assert result.exit_code == 2 and message in result.output.replace("\n", " "), result.output
+
+
+LIMITS = "gasket_opening = 6e-3\ngasket_offset = 0.1\njoint_dislocation = 10e-3\nconvergence_per_mille = 5.0\n"
+
+
+@pytest.mark.parametrize("backend", ["beam-spring", "continuum"])
+def test_response_is_held_against_limits_of_a_file(written, tmp_path, backend):
+    (tmp_path / "limits.toml").write_text(LIMITS)
+    result = gush("respond", written, "--backend", backend, "--limits", tmp_path / "limits.toml", "--json", "-")
+    assert result.exit_code == 0, result.output
+    data = json.loads(result.output)
+    stored = xr.load_dataset(written, group=f"structure/{backend}", engine="h5netcdf")
+    # Straight from the definition: the larger change of the two diameters over 5 per mille of 6.6 m.
+    change = np.maximum(np.abs(stored["convergence_horizontal"]), np.abs(stored["convergence_vertical"])).max().item()
+    assert data["utilisations"]["convergence_utilisation"] == pytest.approx(change / (5e-3 * 6.6))
+    assert stored["dislocation_utilisation"].max() == data["utilisations"]["dislocation_utilisation"]
+    assert "section_utilisation" not in data["utilisations"] and Path(data["figure"]).stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [("gasket_openng = 1.0", "gasket_openng"), ("x =", "valid TOML"), ("joint_dislocation = -1", "greater than 0")],
+)
+def test_limits_that_mean_nothing_are_refused(written, tmp_path, text, message):
+    (tmp_path / "limits.toml").write_text(text)
+    result = gush("respond", written, "--limits", tmp_path / "limits.toml")
+    assert result.exit_code == 2 and message in result.output, result.output
+    missing = gush("respond", written, "--limits", tmp_path / "none.toml")
+    assert missing.exit_code == 2 and "cannot be read" in missing.output
+
+
 def test_comparison_of_a_file_written_by_hand(written, tmp_path):
     result = gush("compare", written, "--out", tmp_path / "out", "--json", tmp_path / "data.json")
     assert result.exit_code == 0, result.output

@@ -176,8 +176,8 @@ def test_missing_physical_number_is_not_filled_in():
     soil = coupling.load_scene("quick").mpm.soils[0].model_dump()
     for key, message in (
         ("hydraulic_conductivity", "soil 'sand': hydraulic_conductivity must be given where there is water"),
-        ("k0", r"soils\[0\].k0: missing"),
-        ("porosity", r"soils\[0\].porosity: missing"),
+        ("k0", r"soils\[0\]: k0 missing"),
+        ("porosity", r"soils\[0\]: porosity missing"),
     ):
         with pytest.raises(SceneError, match=message):
             coupling.load_scene("quick", soils=[{k: v for k, v in soil.items() if k != key}])

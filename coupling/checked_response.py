@@ -1,0 +1,61 @@
+"""A response held against the limits of a file, for the command line: variables, largest utilisations, a picture."""
+
+import tomllib
+
+from pydantic import ValidationError
+
+from coupling.run_folder import FIGURES, RunRefused
+
+
+def read_limits(path):
+    """`structure.Limits` of a TOML file.
+
+    Raises
+    ------
+    RunRefused
+        Not readable, no TOML, or no limits: which key, rule, value.
+    """
+    from structure import Limits
+
+    try:
+        return Limits.from_toml(path)
+    except OSError as problem:
+        raise RunRefused(f"limits '{path}': cannot be read: {problem.strerror}; give a TOML file") from problem
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
+        raise RunRefused(f"limits '{path}': must be valid TOML, got: {problem}") from problem
+    except ValidationError as problem:
+        lines = [
+            f"{'.'.join(map(str, item['loc'])) or 'limits'}: {item['msg'].removeprefix('Value error, ')}"
+            + (f", got {item['input']!r}" if isinstance(item["input"], int | float | str) else "")
+            for item in problem.errors()
+        ]
+        raise RunRefused(f"limits '{path}': " + "; ".join(lines)) from problem
+
+
+def with_checks(response, limits):
+    """The response with the variables of `structure.check`, and the largest value of every utilisation (dict).
+
+    Raises
+    ------
+    RunRefused
+        The response lacks what a limit needs.
+    """
+    from structure import check
+    from structure.checks import UTILISATIONS
+
+    try:
+        checked = check(response, limits)
+    except ValueError as problem:
+        raise RunRefused(str(problem)) from problem
+    return checked, {name: float(checked[name].max()) for name in UTILISATIONS if name in checked}
+
+
+def draw_checks(checked, file, model):
+    """Draw the checks beside a run's figures, or beside a file that is no run's; returns the path."""
+    from coupling.check_figures import checks
+    from coupling.figures import RESOLUTION
+
+    folder = file.parent / FIGURES
+    path = (folder if folder.is_dir() else file.parent) / f"checks-{model}.png"
+    checks(checked).savefig(path, dpi=RESOLUTION)
+    return str(path)
