@@ -39,6 +39,7 @@ from mpm.variables import (
     X,
     Y,
 )
+from mpm.wall import MovingLinings
 
 PARTS = 2  # parts of the mesh that sum at the nodes on their own: fixed, so the bits do not depend on threads
 STEPS_BETWEEN_SORTS = 100
@@ -55,7 +56,7 @@ class RunFailed(RuntimeError):
 
 
 class Solver:
-    """Two-phase MPM on a body-fitted triangle mesh with a fixed lining.
+    """Two-phase MPM on a body-fitted triangle mesh; linings are held or move (`mpm.wall`).
 
     Parameters
     ----------
@@ -185,6 +186,16 @@ class Solver:
         self.friction = np.array(friction, float)
         self.lining = lining
         self.impulse = np.zeros((len(node), 5))
+        rows = [part.rows for part in lining]
+        if scene.gate is not None:
+            rows[scene.gate.tunnel] = np.r_[rows[scene.gate.tunnel], len(node) - rest : len(node)]
+        self.moving, self.wall = None, None  # compiles the motion of the walls out
+        self.lining_displacement = self.lining_velocity = self.lining_impulse = np.zeros(0)
+        if any(scene.lining_of(tunnel) != "fixed" for tunnel in scene.tunnels):
+            self.moving = moving = MovingLinings(scene, mesh, self.contact_of_node, rows)
+            self.wall = moving.wall
+            self.lining_displacement, self.lining_velocity = moving.displacement, moving.velocity
+            self.lining_impulse = moving.left
 
     def _balanced_normals(self, outer):
         """Normals of the outer face along the resultant of the hydrostatic pressure at each node.
@@ -366,15 +377,17 @@ class Solver:
         dt, limit = critical_time_step([*self._limits, (self.longest_step, 0.0)], self.wave_speed, numerics.courant)
         if dt > dt_max:
             dt, limit = dt_max, "output"
+        if self.moving is not None:
+            self.moving.advance(self.sums, dt, self.normal, self.active, self.friction)
         self.over_nodes(
-            self._solve_nodes, self.sums, dt, self.scene.gravity, density, *wall, self.friction, self.nodes,
+            self._solve_nodes, self.sums, dt, self.scene.gravity, density, *wall, self.friction, self.wall, self.nodes,
             self.status, self.impulse, per_range=(self.ledger,),
         )  # fmt: skip
         self.over_elements(
             self._advance_points, *layout, density, *grid, dt, math.exp(-numerics.pic_rate * dt),
             numerics.pressure_filter, per_range=(self.momenta,),
         )  # fmt: skip
-        self.over_nodes(self._remap_nodes, self.momenta, *wall, self.nodes, self.status)
+        self.over_nodes(self._remap_nodes, self.momenta, *wall, self.wall, self.nodes, self.status)
         self._element_rates()
         outcome = self._update_points(dt, True)
         self._check(outcome)
@@ -530,6 +543,8 @@ class Solver:
                     "water_pressure_std": spread[1],
                 }
             )
+            if self.moving is not None:
+                result[-1] |= self.moving.motion_at(len(result) - 1, part.theta)
         return result
 
 
