@@ -117,7 +117,7 @@ def features(scene, threads):
             numerics.pressure_filter > 0 and s.water is not None,
             f"{numerics.pressure_filter:g} of what is not smooth, a step" if numerics.pressure_filter else "set to 0",
         ),
-        ("motion of the lining", False, f"lining = '{s.lining}'"),
+        ("motion of the lining", any(s.lining_of(t) != "fixed" for t in s.tunnels), _linings(s)),
         ("half model", False, "the whole box is computed, also for symmetric scenes"),
         (
             "snapshots of the points",
@@ -132,6 +132,19 @@ def features(scene, threads):
         ),
     )
     return [{"feature": name, "active": bool(active), "reason": reason} for name, active, reason in table]
+
+
+def _linings(s):
+    """How the linings stand in the ground, in words."""
+    kinds = [
+        f"'elastic', {t.lining_modulus / 1e9:g} GPa, {t.lining_harmonics} harmonics"
+        if s.lining_of(t) == "elastic"
+        else f"'{s.lining_of(t)}'"
+        for t in s.tunnels
+    ] or [f"'{s.lining}'"]
+    if len(set(kinds)) == 1:
+        return f"lining = {kinds[0]}"
+    return "; ".join(f"tunnel {k}: lining = {kind}" for k, kind in enumerate(kinds))
 
 
 def _measured_rate(solver):

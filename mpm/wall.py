@@ -19,7 +19,8 @@ from mpm.jit import kernel
 from mpm.lining import ElasticRing, RigidRing
 from mpm.variables import B_D, B_FLX, B_FLY, B_FX, B_FY, B_ML, B_MN, B_MS, B_PLX, B_PLY, B_PSX, B_PSY
 
-MAX_ITERATIONS = 20
+MAX_ITERATIONS = 100
+SMALLEST_SHARE = 1e-3  # of Newton's step
 TOLERANCE = 1e-11  # of the largest term of an equation: round-off of its sum
 
 # What a contact node brings to the solution: masses, drag times dt, momenta free of reactions; and of its reactions.
@@ -174,8 +175,8 @@ def velocity_kernel(wet):
         m = velocity.size
         before, owed = velocity.copy(), left.copy()
         matrix, residual, scale = np.empty((m, m)), np.empty(m), np.empty(m)
-        along, across = np.empty(m), np.empty(m)
-        iterations = 0
+        along, across, change = np.empty(m), np.empty(m), np.zeros(m)
+        iterations, share, smallest = 0, 1.0, np.inf
         while True:
             for i in range(m):
                 residual[i] = owed[i] - due[i]
@@ -208,16 +209,25 @@ def velocity_kernel(wet):
                     by_n, by_t = along[i] * push_n + across[i] * shear_n, across[i] * shear_t
                     for j in range(m):
                         matrix[i, j] += by_n * along[j] + by_t * across[j]
-            error = 0.0
+            error = size = 0.0
             for i in range(m):
+                size += residual[i] ** 2
                 if scale[i] > 0.0:
                     error = max(error, abs(residual[i]) / scale[i])
             if error < TOLERANCE or iterations == MAX_ITERATIONS:
                 break
             iterations += 1
-            solve_dense(matrix, residual)
+            if size >= smallest and share > SMALLEST_SHARE:
+                # contacts that change back and forth, as between sticking and slipping: half the way
+                share *= 0.5
+                for i in range(m):
+                    velocity[i] += share * change[i]
+                continue
+            smallest, share = size, 1.0
+            change[:] = residual
+            solve_dense(matrix, change)
             for i in range(m):
-                velocity[i] -= residual[i]
+                velocity[i] -= change[i]
         left[:] = residual
         return iterations
 
