@@ -286,9 +286,8 @@ def page(data, machine):
         lines += table(["M of joints, ring in soil springs", *"123456"], joints)
     span = [events[kind]["late_seconds"] for kind in KINDS]
     lines += [
-        f"The second state is a mean over only {1e3 * min(span):.0f} to {1e3 * max(span):.0f} ms: waves of the water are "
-        "not gone from it, so differences",
-        "of some 30 kPa in its water pressures are not the lining's doing alone.",
+        f"The second state is a mean over only {1e3 * min(span):.0f} to {1e3 * max(span):.0f} ms: waves of the water",
+        "are not gone from it, so differences of its water pressures are not the lining's doing alone.",
         "",
         *READING,
     ]
@@ -375,8 +374,8 @@ def answer(data):
         f"{here['fixed']:.0f} to {here['floating']:.0f}, away from the published one. An elastic ring gives way until "
         f"the ground carries the difference: its own moment is {max(elastic):.0f} to {min(elastic):.0f}, whatever "
         f"slips and whichever K0 is taken, about what Einstein & Schwartz have for elastic ground (more where K0 is "
-        f"near the active {data['active_coefficient']:.3f}: the ground yields). Only a ring too stiff to give way comes "
-        f"near ({ten:.0f} with ten times the modulus, {hundred:.0f} with a hundred times)."
+        f"near the active {data['active_coefficient']:.3f}: the ground yields). Only a ring too stiff to give way "
+        f"comes near ({ten:.0f} with ten times the modulus, {hundred:.0f} with a hundred times)."
     )
     more = (
         f"Nor do the springs of the structural model explain it. Theory loads in springs of a tenth of the ground's "
