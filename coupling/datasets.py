@@ -30,6 +30,17 @@ PRESSURES = {
     "soil_pressure_std": ("Pa", "standard deviation of the soil pressure within the output interval"),
     "water_pressure_std": ("Pa", "standard deviation of the water pressure within the output interval"),
 }
+#: The same for linings that move in the soil computation: at the end of the interval, since the undisturbed ground.
+MOTION = {
+    "displacement_radial": ("m", "displacement of the lining's outer face, outward positive"),
+    "displacement_tangential": ("m", "displacement of the lining's outer face, clockwise positive"),
+}
+#: And for elastic ones: the ring's own forces, per metre of tunnel.
+RING_FORCES = {
+    "axial_force": ("N m-1", "axial force of the elastic lining, compression positive"),
+    "shear_force": ("N m-1", "shear force of the elastic lining, -dM/ds"),
+    "bending_moment": ("N", "bending moment of the elastic lining, tension on the outer face positive"),
+}
 #: Variables on (time,) that `/lining` repeats from `/history`, so that pressures can be compared at equal inflow.
 PROGRESS = {
     "inflow_mass": ("kg m-1", "grains inside the tunnel, per metre of tunnel"),
@@ -175,6 +186,8 @@ class RunWriter:
         self._weights = {}
         self._count, self._snapshots = records, snapshots
         self._n_tunnels = len(scene.tunnels)
+        kinds = {scene.lining_of(tunnel) for tunnel in scene.tunnels}
+        self._on_theta = PRESSURES | (MOTION if kinds - {"fixed"} else {}) | (RING_FORCES if "elastic" in kinds else {})
 
     @property
     def written(self):
@@ -230,9 +243,10 @@ class RunWriter:
                 theta.attrs["bounds"] = "theta_bnds"
                 lining.create_variable("theta_bnds", ("theta", "bound"), "f8")[:] = cell_bounds()
                 shape = (16, *([self._n_tunnels] if self._n_tunnels > 1 else []), 360)
-                for name, meaning in PRESSURES.items():
+                for name, meaning in self._on_theta.items():
                     variable = _variable(lining, name, ("time", *space), "f8", meaning, shape)
-                    variable.attrs["cell_methods"] = "time: mean theta: mean"
+                    when = "mean" if name in PRESSURES else "point"
+                    variable.attrs["cell_methods"] = f"time: {when} theta: mean"
             for name, meaning in PROGRESS.items():
                 _variable(lining, name, ("time",), "f8", meaning, (256,))
             history = self._create_group(file, "history", {})
@@ -259,7 +273,7 @@ class RunWriter:
     def _write_lining(self, group, batch):
         rows = slice(self._count, self._count + len(batch))
         _grow_to(group, rows.stop)
-        for name in PRESSURES if self._n_tunnels else ():
+        for name in self._on_theta if self._n_tunnels else ():
             values = np.array([[self._resample(t, part, name) for t, part in enumerate(r.lining)] for r in batch])
             group[name][rows] = values if self._n_tunnels > 1 else values[:, 0]
         for name in PROGRESS:
@@ -269,6 +283,8 @@ class RunWriter:
     def _resample(self, tunnel, part, name):
         if tunnel not in self._weights:
             self._weights[tunnel] = cell_mean_weights(part["theta"])
+        if name not in part:  # of a lining that is not elastic, beside one that is
+            return np.full(360, np.nan)
         return self._weights[tunnel] @ part[name]
 
     def _write_history(self, group, batch):

@@ -123,7 +123,7 @@ def features(scene, threads):
             numerics.pressure_filter > 0 and s.water is not None,
             f"{numerics.pressure_filter:g} of what is not smooth, a step" if numerics.pressure_filter else "set to 0",
         ),
-        ("motion of the lining", False, f"lining = '{s.lining}'"),
+        ("motion of the lining", any(s.lining_of(t) != "fixed" for t in s.tunnels), _linings(s)),
         ("the half x < 0", not s.is_half, _why_half(s)),
         (
             "snapshots of the points",
@@ -148,6 +148,19 @@ def _why_half(s):
     if s.is_half:
         return "the scene is its own mirror image: x >= 0 is computed, results are of the whole"
     return s.asymmetry or "symmetry = 'whole'; 'auto' would compute x >= 0 only"
+
+
+def _linings(s):
+    """How the linings stand in the ground, in words."""
+    kinds = [
+        f"'elastic', {t.lining_modulus / 1e9:g} GPa, {t.lining_harmonics} harmonics"
+        if s.lining_of(t) == "elastic"
+        else f"'{s.lining_of(t)}'"
+        for t in s.tunnels
+    ] or [f"'{s.lining}'"]
+    if len(set(kinds)) == 1:
+        return f"lining = {kinds[0]}"
+    return "; ".join(f"tunnel {k}: lining = {kind}" for k, kind in enumerate(kinds))
 
 
 def _measured_rate(solver):

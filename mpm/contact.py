@@ -91,7 +91,7 @@ def stop_rows(i, next_row, nodes, mean):
 @kernel
 def solve_nodes(
     first, last, which, next_row, level_of_row, begun, dt_of_level, sums, mean, gravity, density_liquid, fixed,
-    contact_of_node, normal, active, friction, nodes, status, impulse, ledger,
+    contact_of_node, normal, active, friction, wall, nodes, status, impulse, ledger,
 ):  # fmt: skip
     """Add up the parts of a range of nodes and advance both phases by the time step of each node's finest level.
 
@@ -115,6 +115,8 @@ def solve_nodes(
         Row of the contact arrays or -1.
     normal, active, friction : (n_contact, 2), (n_contact,), (n_contact,)
         Into the material; whether the wall is there; Coulomb coefficient [-].
+    wall : (n_contact, 2) float64 or None
+        Velocity of the wall [m/s]; None where all stand still, which compiles its motion out.
     nodes : (n_rows, 16) float64
         Written: new velocities, increments (over their whole step for tied rows), masses, pressure projection.
     impulse : (n_contact, 5) float64
@@ -175,6 +177,11 @@ def solve_nodes(
         c = contact_of_node[i]
         if c >= 0 and active[c]:
             nx, ny = normal[c, 0], normal[c, 1]
+            if wall is not None:  # momenta and velocities as seen from the wall
+                bsx -= (ms + mn) * wall[c, 0]
+                bsy -= (ms + mn) * wall[c, 1]
+                blx -= ml * wall[c, 0]
+                bly -= ml * wall[c, 1]
             bsn, bln = nx * bsx + ny * bsy, nx * blx + ny * bly
             bst, blt = ny * bsx - nx * bsy, ny * blx - nx * bly
             vsn, vln, r_s, r_l = wall_normal(bsn, bln, ms, ml, mn, d, dt)
@@ -205,6 +212,11 @@ def solve_nodes(
             unfelt += abs(ms * vsx + mn * vlx - bsx - dt * (nx * (r_s + r_l) + ny * shear))
             unfelt += abs(ms * vsy + mn * vly - bsy - dt * (ny * (r_s + r_l) - nx * shear))
             reactions += dt * (r_s + r_l)
+            if wall is not None:
+                vsx += wall[c, 0]
+                vsy += wall[c, 1]
+                vlx += wall[c, 0]
+                vly += wall[c, 1]
         else:
             vsx, vlx = free_pair(bsx, blx, ms, ml, mn, d)
             vsy, vly = free_pair(bsy, bly, ms, ml, mn, d)
@@ -259,7 +271,7 @@ def solve_nodes(
 @kernel
 def solve_dry_nodes(
     first, last, which, next_row, level_of_row, begun, dt_of_level, sums, mean, gravity, density_liquid, fixed,
-    contact_of_node, normal, active, friction, nodes, status, impulse, ledger,
+    contact_of_node, normal, active, friction, wall, nodes, status, impulse, ledger,
 ):  # fmt: skip
     """`solve_nodes` for dry soil: one momentum equation a node; the water's columns are not touched."""
     sum_x = sum_y = kinetic = by_gravity = by_stress = unfelt = reactions = 0.0
@@ -294,6 +306,10 @@ def solve_dry_nodes(
         c = contact_of_node[i]
         if c >= 0 and active[c]:
             nx, ny = normal[c, 0], normal[c, 1]
+            if wall is not None:
+                px -= ms * wall[c, 0]
+                py -= ms * wall[c, 1]
+                free_x, free_y = px, py
             pn, pt = nx * px + ny * py, ny * px - nx * py
             if pn < 0.0:
                 reaction = -pn / dt
@@ -314,6 +330,9 @@ def solve_dry_nodes(
                 unfelt += abs(px - free_x - dt * (nx * reaction + ny * shear))
                 unfelt += abs(py - free_y - dt * (ny * reaction - nx * shear))
                 reactions += dt * reaction
+            if wall is not None:
+                px += ms * wall[c, 0]
+                py += ms * wall[c, 1]
         vx, vy = px / ms, py / ms
         if fixed[i] & FIXED_X:
             vx = 0.0
@@ -360,7 +379,7 @@ def remap_kernel(wet):
     @kernel
     def remap_nodes(
         first, last, which, next_row, level_of_row, finished, dt_of_level, momenta, sums, mean, fixed, contact_of_node,
-        normal, active, nodes, status,
+        normal, active, wall, nodes, status,
     ):  # fmt: skip
         """Nodal velocities from the updated point momenta (MUSL), under the constraints that acted in this step.
 
@@ -399,6 +418,11 @@ def remap_kernel(wet):
             c = contact_of_node[i]
             if c >= 0 and active[c]:
                 nx, ny = normal[c, 0], normal[c, 1]
+                if wall is not None:
+                    sx -= wall[c, 0]
+                    sy -= wall[c, 1]
+                    lx -= wall[c, 0]
+                    ly -= wall[c, 1]
                 if status[i] & SOLID_STICKS:
                     sx = sy = 0.0
                 else:
@@ -411,6 +435,11 @@ def remap_kernel(wet):
                     if status[i] & LIQUID_HELD or vn < 0.0:
                         lx -= vn * nx
                         ly -= vn * ny
+                if wall is not None:
+                    sx += wall[c, 0]
+                    sy += wall[c, 1]
+                    lx += wall[c, 0]
+                    ly += wall[c, 1]
             if fixed[i] & FIXED_X:
                 sx = lx = 0.0
             if fixed[i] & FIXED_Y:

@@ -130,14 +130,36 @@ def _soil(given) -> str:
     return f"soil '{given.data['name']}'" if "name" in given.data else "soil"
 
 
+#: How a lining stands in the ground: held, rigid and free to move, or a homogeneous elastic ring.
+Lining = Literal["fixed", "floating", "elastic"]
+
+
 class Tunnel(Part):
-    """A circular tunnel; `cover` is the depth of its outer crown."""
+    """A circular tunnel; `cover` is the depth of its outer crown.
+
+    Parameters
+    ----------
+    lining : str or None
+        "fixed", "floating" (rigid, moves under its weight, soil and water) or "elastic" (homogeneous ring in plane
+        strain); None: what the scene says for all tunnels.
+    lining_density : float or None
+        [kg/m3], needed where the lining moves.
+    lining_modulus, lining_poissons_ratio : float or None
+        Young's modulus [Pa] and Poisson's ratio, needed where it is elastic.
+    lining_harmonics : int
+        Fourier harmonics of the displacement of an elastic lining; 2 ovalises it.
+    """
 
     x: Length
     cover: Length = Field(gt=0)
     outer_diameter: Length = Field(gt=0)
     inner_diameter: Length = Field(gt=0)
     friction_coefficient: float = Field(ge=0, le=2)
+    lining: Lining | None = None
+    lining_density: Density | None = Field(default=None, ge=1, le=1e5)
+    lining_modulus: Pressure | None = Field(default=None, ge=1e6, le=1e13)
+    lining_poissons_ratio: float | None = Field(default=None, ge=0, lt=0.5)
+    lining_harmonics: int = Field(default=8, ge=2, le=40)
 
     @model_validator(mode="after")
     def _check(self):
@@ -269,7 +291,7 @@ class Scene(Part):
     soils: tuple[Soil, ...] = Field(min_length=1)
     tunnels: tuple[Tunnel, ...] = ()
     gate: Gate | None = None
-    lining: Literal["fixed"] = "fixed"
+    lining: Lining = "fixed"
     initial_contact: Literal["bonded", "frictional"] = "bonded"
     interior: Literal["resolved", "sink"] = "resolved"
     symmetry: Literal["auto", "whole", "half"] = "auto"
@@ -298,6 +320,7 @@ class Scene(Part):
             )
         size = self.discretisation.element_size
         for k, t in enumerate(self.tunnels):
+            self._check_lining(k, t)
             sides = (
                 self.box.width / 2 - abs(t.x) - t.outer_radius,
                 self.box.depth - t.axis_depth - t.outer_radius,
@@ -350,12 +373,36 @@ class Scene(Part):
         across = self.discretisation.elements_across_gate
         if self.gate is not None and across % 2:
             return f"{across} elements across the gate, a half model needs an even number"
+        if self.lining_of(self.tunnels[0]) != "fixed":
+            return "a lining that moves"
         return None
 
     @property
     def is_half(self):
         """Whether only x >= 0 is computed."""
         return self.symmetry == "half" or (self.symmetry == "auto" and self.asymmetry is None)
+
+    def lining_of(self, tunnel):
+        """How a tunnel's lining stands in the ground: its own choice, else that of the scene."""
+        return tunnel.lining or self.lining
+
+    def _check_lining(self, k, tunnel):
+        kind = self.lining_of(tunnel)
+        needed = {"fixed": (), "floating": ("lining_density",)}.get(
+            kind, ("lining_density", "lining_modulus", "lining_poissons_ratio")
+        )
+        for name in needed:
+            if getattr(tunnel, name) is None:
+                raise ValueError(
+                    f"tunnel {k}: {name} must be given where its lining is '{kind}', got none; concrete: "
+                    "lining_density = 2500 kg/m3, lining_modulus = 34.5e9 Pa, lining_poissons_ratio = 0.2"
+                )
+        most = math.floor(math.pi * tunnel.outer_radius / self.discretisation.element_size_lining)
+        if kind == "elastic" and tunnel.lining_harmonics > most:
+            raise ValueError(
+                f"tunnel {k}: lining_harmonics must not exceed {most}, two elements of the lining a wave, got "
+                f"{tunnel.lining_harmonics}; lower it, or discretisation.element_size_lining"
+            )
 
     @cached_property
     def estimated_elements(self):

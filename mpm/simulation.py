@@ -21,7 +21,9 @@ class Record:
 
     `dt` and `steps` are those of the smallest elements. Pressures [Pa], compression positive; `lining` has one dict a
     tunnel with theta [degrees from the crown, clockwise], arc [m], soil_pressure (effective), water_pressure,
-    soil_shear (clockwise traction on the lining) and the standard deviation of the first two within the interval.
+    soil_shear (clockwise traction on the lining) and the standard deviation of the first two within the interval;
+    of a lining that moves also its displacement at the end, and of an elastic one its forces
+    (`mpm.wall.MovingLinings.motion_at`).
     `balances` are those of :meth:`mpm.Solver.balances`.
     """
 

@@ -42,6 +42,7 @@ from mpm.variables import (
     X,
     Y,
 )
+from mpm.wall import MovingLinings
 
 PARTS = 2  # parts of the mesh that sum at the nodes on their own: fixed, so the bits do not depend on threads
 STEPS_BETWEEN_SORTS = 100
@@ -64,7 +65,7 @@ class RunFailed(RuntimeError):
 
 
 class Solver:
-    """Two-phase MPM on a body-fitted triangle mesh with a fixed lining.
+    """Two-phase MPM on a body-fitted triangle mesh; linings are held or move (`mpm.wall`).
 
     Parameters
     ----------
@@ -140,7 +141,9 @@ class Solver:
         """Sort the elements by level, finest first, and tie the levels; one level without local time stepping."""
         altitude = element_geometry(mesh)[:, 7]
         level = np.zeros(len(altitude), np.int8)
-        if self.scene.numerics.local_time_stepping:
+        # a lining that moves is solved together with all nodes on it, which then step together
+        held = all(self.scene.lining_of(tunnel) == "fixed" for tunnel in self.scene.tunnels)
+        if self.scene.numerics.local_time_stepping and held:
             weight = np.full(len(altitude), float(self.scene.discretisation.points_per_element))
             level = element_levels(mesh.elements, len(mesh.nodes), altitude, weight)
         mesh, level = sorted_by_level(mesh, level)
@@ -231,6 +234,16 @@ class Solver:
         for normal in (self.normal, self._normal_open):
             normal[on_mirror_line, 0] = 0.0
         self.impulse = np.zeros((len(node), 5))
+        rows = [part.rows for part in lining]
+        if scene.gate is not None:
+            rows[scene.gate.tunnel] = np.r_[rows[scene.gate.tunnel], len(node) - rest : len(node)]
+        self.moving, self.wall = None, None  # compiles the motion of the walls out
+        self.lining_displacement = self.lining_velocity = self.lining_impulse = np.zeros(0)
+        if any(scene.lining_of(tunnel) != "fixed" for tunnel in scene.tunnels):
+            self.moving = moving = MovingLinings(scene, mesh, self.contact_of_node, rows)
+            self.wall = moving.wall
+            self.lining_displacement, self.lining_velocity = moving.displacement, moving.velocity
+            self.lining_impulse = moving.left
 
     def _ring(self, outer):
         """Positions of all nodes of a ring, clockwise: those of a half model and their mirror images [m]."""
@@ -468,9 +481,12 @@ class Solver:
         nodes = (levels.nodes, levels.next_row, levels.of_row)
         wall = (self.fixed, self.contact_of_node, self.normal, self.active)
 
+        if self.moving is not None:
+            self.moving.advance(self.sums, float(dt_of_level[0]), self.normal, self.active, self.friction)
         self.over_nodes(
             self._solve_nodes, *nodes, begun, dt_of_level, self.sums, self.tied_means, self.scene.gravity, density,
-            *wall, self.friction, self.nodes, self.status, self.impulse, per_range=(self.ledger,), up_to=begun,
+            *wall, self.friction, self.wall, self.nodes, self.status, self.impulse, per_range=(self.ledger,),
+            up_to=begun,
         )  # fmt: skip
         self.over_elements(
             self._advance_points, *layout, density, levels.rows, self.geometry, self.nodes, self.tied_means,
@@ -479,7 +495,7 @@ class Solver:
         )  # fmt: skip
         self.over_nodes(
             self._remap_nodes, *nodes, finished, dt_of_level, self.momenta, self.sums, self.tied_means, *wall,
-            self.nodes, self.status, up_to=finished,
+            self.wall, self.nodes, self.status, up_to=finished,
         )  # fmt: skip
         self._element_rates(finished)
         outcome = self._update_points(dt_of_level, True, finished)
@@ -633,6 +649,8 @@ class Solver:
                     "water_pressure_std": spread[1],
                 }
             )
+            if self.moving is not None:
+                result[-1] |= self.moving.motion_at(len(result) - 1, part.theta)
         return result
 
 

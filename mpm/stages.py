@@ -89,12 +89,14 @@ def relax_elements(
 @kernel
 def relax_nodes(
     first, last, force, held_force, held_liquid, mass, fixed, contact_of_node,
-    normal, active, friction, velocity, reaction, sums,
+    normal, active, friction, wall, velocity, reaction, sums,
 ):  # fmt: skip
     """Advance the fictitious motion of a range of nodes by 1 s.
 
     held_force, held_liquid : (n_nodes, 2) float64
         Weight plus pore-pressure force of the mixture and of the liquid [N/m], constant.
+    wall : (n_contact, 2) float64 or None
+        Velocity of the lining; None where it is held.
     reaction : (n_contact, 3) float64
         Written: effective normal, water normal, tangential on the material [N/m].
     sums : (3,) float64
@@ -117,6 +119,9 @@ def relax_nodes(
             fn = nx * fx + ny * fy + water
             ft = ny * fx - nx * fy
             vn, vt = nx * vx + ny * vy, ny * vx - nx * vy
+            if wall is not None:
+                vn -= nx * wall[c, 0] + ny * wall[c, 1]
+                vt -= ny * wall[c, 0] - nx * wall[c, 1]
             r_s = max(-(m * vn + fn), 0.0)
             shear = -(m * vt + ft)
             limit = friction[c] * r_s if r_s > 0.0 else 0.0  # infinite friction times zero is not a number
@@ -181,11 +186,16 @@ def relax(solver, friction, tolerance, max_steps, progress=None):
     residual = np.inf
     for step in range(1, max_steps + 1):
         s.over_elements(relax_elements, *layout, velocity, 1, per_range=(force,))
+        lining_energy = lining_unbalanced = 0.0
+        if s.moving is not None:
+            lining_energy, lining_unbalanced = s.moving.settle(
+                held + force.sum(axis=0), held_liquid, mass, velocity, s.normal, s.active, friction
+            )
         s.over_nodes(
             relax_nodes, force, held, held_liquid, mass, s.fixed, s.contact_of_node, s.normal, s.active, friction,
-            velocity, reaction, per_range=(sums,),
+            s.wall, velocity, reaction, per_range=(sums,),
         )  # fmt: skip
-        energy, unbalanced, total = sums.sum(axis=0)
+        energy, unbalanced, total = sums.sum(axis=0) + np.array([lining_energy, lining_unbalanced, 0.0])
         residual = float(np.sqrt(unbalanced / total)) if unbalanced > 0.0 else 0.0  # no weight at all: 0 / 0
         if progress is not None and step % 50 == 0:
             progress(step, residual)
@@ -194,5 +204,9 @@ def relax(solver, friction, tolerance, max_steps, progress=None):
         if energy < last_energy:
             velocity[:] = 0.0
             energy = 0.0
+            if s.moving is not None:
+                s.moving.halt()
         last_energy = energy
+    if s.moving is not None:
+        s.moving.halt()
     return step, residual, reaction

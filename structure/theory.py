@@ -216,6 +216,21 @@ def einstein_schwartz_full_slip_moment(stress_ratio: float, poissons_ratio: floa
     return (1 - stress_ratio) / 2 * 3 * (3 - 4 * nu) / (flexibility_ratio * (1 - nu) + 3 * (5 - 6 * nu))
 
 
+def einstein_schwartz_no_slip_moment(
+    stress_ratio: float, poissons_ratio: float, flexibility_ratio: float, compressibility_ratio: float
+) -> float:
+    """Largest M/(P R^2) of a lining bonded to elastic ground, P the overburden stress.
+
+    (1 - K)/4 (1 - 2 a + 2 b), b = C (1 - nu)/(2 (C (1 - nu) + 4 nu - 6 beta - 3 beta C (1 - nu))), a = beta b,
+    beta = ((6 + F) C (1 - nu) + 2 F nu)/(3 F + 3 C + 2 C F (1 - nu)); F as of full slip,
+    C = E R (1 - nu_l^2)/(E_l A (1 - nu^2)). Source: Einstein & Schwartz (1979).
+    """
+    nu, f, c = poissons_ratio, flexibility_ratio, compressibility_ratio
+    beta = ((6 + f) * c * (1 - nu) + 2 * f * nu) / (3 * f + 3 * c + 2 * c * f * (1 - nu))
+    b = c * (1 - nu) / (2 * (c * (1 - nu) + 4 * nu - 6 * beta - 3 * beta * c * (1 - nu)))
+    return (1 - stress_ratio) / 4 * (1 - 2 * beta * b + 2 * b)
+
+
 def theoretical_pressures(
     *,
     outer_diameter: float,

@@ -12,9 +12,11 @@ import pytest
 from synthetic_run import make_quick_scene, record
 from typer.testing import CliRunner
 
+import coupling
 import mpm
 from coupling import datasets
 from coupling.cli import ProgressLine, app
+from coupling.plan import features
 from coupling.run import check_memory, run
 from coupling.run_folder import RunRefused, claimed, default_folder
 
@@ -230,6 +232,15 @@ def test_plan_says_what_is_left_out_and_why(tmp_path):
     assert data["points"] > data["elements"] > 0 and data["expected_steps"] <= data["steps_at_most"]
     left_out = {row["feature"]: row["reason"] for row in data["features"] if not row["active"]}
     assert left_out["motion of the lining"] == "lining = 'fixed'"
+
+
+def test_plan_says_which_lining_moves():
+    scene = coupling.load_scene("twin-tunnels").mpm
+    held, ring = scene.tunnels[0], scene.tunnels[1].model_copy(update={"lining": "elastic"})
+    mixed = coupling.load_scene("twin-tunnels", tunnels=[t.model_dump(exclude_none=True) for t in (held, ring)])
+    line = next(row for row in features(mixed, 1) if row["feature"] == "motion of the lining")
+    assert line["active"]
+    assert line["reason"] == "tunnel 0: lining = 'fixed'; tunnel 1: lining = 'elastic', 34.5 GPa, 8 harmonics"
 
 
 def test_progress_line_names_the_limit_and_the_time_left():

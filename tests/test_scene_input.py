@@ -124,6 +124,9 @@ def test_strings_with_units_are_converted():
         ("tunnels", {"x": 48.0}, ["tunnel 0", "box", "51.3", "50", "enlarge"]),
         ("tunnels", {"cover": 45.0}, ["tunnel 0", "box", "51.6", "50", "enlarge"]),
         ("tunnels", {"inner_diameter": 7.0}, ["inner_diameter", "7", "6.6"]),
+        ("tunnels", {"lining": "loose"}, ["tunnels[0].lining", "loose", "fixed", "elastic"]),
+        ("tunnels", {"lining": "elastic", "lining_harmonics": 30}, ["tunnel 0", "lining_harmonics", "29", "got 30"]),
+        ("tunnels", {"lining_poissons_ratio": 0.5}, ["lining_poissons_ratio", "got 0.5"]),
         ("water", {"table_depth": 60.0}, ["table_depth", "60", "50"]),
         ("discretisation", {"elements_across_gate": 1}, ["elements_across_gate", "got 1", "2"]),
         ("discretisation", {"element_size": 0.002}, ["discretisation", "memory", "element_size"]),
@@ -139,6 +142,15 @@ def test_bad_value_gets_one_message_with_name_value_and_remedy(table, values, pa
     message = str(caught.value)
     assert "has 1 mistake:" in message and len(message.splitlines()) == 2
     assert not [part for part in parts if part not in message], message
+
+
+def test_moving_lining_needs_its_material():
+    changes = edited("quick", "tunnels", lining="elastic")
+    del changes["tunnels"][0]["lining_modulus"]
+    with pytest.raises(SceneError, match=r"tunnel 0: lining_modulus must be given .* 'elastic'"):
+        coupling.load_scene("quick", **changes)
+    changes["tunnels"][0] |= {"lining": "fixed"}
+    coupling.load_scene("quick", **changes)
 
 
 def test_overlapping_tunnels_are_refused():
