@@ -34,6 +34,23 @@ RingScene = Annotated[
 Threads = Annotated[int | None, typer.Option(min=1, help="Threads; all cores when left out. Does not change results.")]
 
 
+def _tell_version(asked: bool):
+    if asked:
+        from importlib.metadata import version
+
+        typer.echo(f"gush {version('gushing')}")
+        raise typer.Exit()
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+):
+    pass
+
+
 @app.command("run")
 def run_command(
     scene: Annotated[

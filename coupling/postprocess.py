@@ -27,6 +27,13 @@ def at_inflow(dataset, inflow_mass):
     ------
     ValueError
         When the run did not get there.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> run = xr.Dataset({"inflow_mass": ("time", [0.0, 40.0])}, coords={"time": [0.0, 2.0]})
+    >>> at_inflow(run, 10.0).time.item()
+    0.5
     """
     mass = dataset["inflow_mass"].values
     reached = np.flatnonzero(mass >= inflow_mass)

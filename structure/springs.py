@@ -42,6 +42,13 @@ def limit_pressures(ground: Ground) -> tuple[float, float]:
     Source: Do et al. (2014), hyperstatic reaction method, *as usually quoted*. The primary source could not be opened
     to check it, so limits measured or agreed for a site belong into ``Ground.limit_pressure_normal`` and
     ``Ground.limit_pressure_tangential``, which win.
+
+    Examples
+    --------
+    >>> ground = Ground(youngs_modulus=4e7, poissons_ratio=0.3, cohesion=0.0, friction_angle=30.0,
+    ...                 vertical_stress=2e5, horizontal_stress=1e5)
+    >>> [round(limit / 1e3, 1) for limit in limit_pressures(ground)]
+    [192.9, 86.6]
     """
     sin_phi = math.sin(math.radians(ground.friction_angle))
     cos_phi = math.cos(math.radians(ground.friction_angle))
@@ -103,6 +110,11 @@ def soil_reaction(displacement: np.ndarray, spring: SoilSpring) -> tuple[np.ndar
         dp/dd [Pa/m]; at d = 0 the initial stiffness.
 
     Source: Xie et al., Eq. (7).
+
+    >>> spring = SoilSpring(stiffness=2e7, limit=1e5, pulls=False)
+    >>> reaction, tangent = soil_reaction(np.array([-0.001, 0.0, 0.005]), spring)
+    >>> reaction.tolist()
+    [0.0, 0.0, 50000.0]
     """
     stiffness, limit, pulls = spring
     if limit == 0 or stiffness == 0:

@@ -24,13 +24,21 @@ class RingForces(NamedTuple):
 
 
 def uniform_pressure(pressure: float, radius: float, theta: np.ndarray) -> RingForces:
-    """Forces under a uniform inward pressure [Pa]: N = p R, no moment."""
+    """Forces under a uniform inward pressure [Pa]: N = p R, no moment.
+
+    >>> float(uniform_pressure(1e5, 3.0, np.array([0.0])).axial_force[0])
+    300000.0
+    """
     zero = np.zeros_like(theta)
     return RingForces(zero + pressure * radius, zero, zero)
 
 
 def radial_cos2(pressure: float, radius: float, theta: np.ndarray) -> RingForces:
-    """Forces under an inward pressure p cos(2 theta): M = -p R^2/3 cos(2 theta), from equilibrium alone."""
+    """Forces under an inward pressure p cos(2 theta): M = -p R^2/3 cos(2 theta), from equilibrium alone.
+
+    >>> radial_cos2(3e3, 2.0, np.array([0.0])).bending_moment.item()
+    -4000.0
+    """
     return RingForces(
         -pressure * radius / 3 * np.cos(2 * theta),
         -2 / 3 * pressure * radius * np.sin(2 * theta),
@@ -269,6 +277,14 @@ def theoretical_pressures(
     -------
     xarray.Dataset
         soil_pressure, water_pressure, soil_shear (time, theta) [Pa].
+
+    Examples
+    --------
+    >>> loads = theoretical_pressures(
+    ...     outer_diameter=6.6, cover=20.0, buoyant_unit_weight=8.9e3, coefficient_at_rest=0.577
+    ... )
+    >>> [round(loads.soil_pressure.sel(theta=angle).item() / 1e3) for angle in (0, 90, 180)]
+    [178, 120, 237]
     """
     import xarray as xr
 

@@ -1,0 +1,191 @@
+"""What README.md and docs/ tell people to type works: blocks run, doctests hold, commands know their options.
+
+The tutorial is followed first; every other page starts from the folder that it leaves. Commands run as `gush` would,
+in this process. A block that would take minutes or another machine says so in its title; its commands are parsed only.
+"""
+
+import contextlib
+import doctest
+import importlib
+import os
+import pkgutil
+import re
+import shlex
+import shutil
+import subprocess
+import tomllib
+from pathlib import Path
+
+import matplotlib
+import pytest
+import typer
+from markdown_it import MarkdownIt
+
+import coupling
+import structure
+import structure.models
+from coupling.cli import app
+
+ROOT = Path(__file__).parent.parent
+PAGES = ["README.md", "CONTRIBUTING.md", *(str(p.relative_to(ROOT)) for p in sorted((ROOT / "docs").rglob("*.md")))]
+TUTORIAL = "docs/tutorial.md"
+TITLE = re.compile(r'title="([^"]*)"')
+NOT_RUN = re.compile(r"not run by the tests: \S.*")
+FILE_NAME = re.compile(r"[\w.-]+")
+#: Languages of blocks that are shown, not executed.
+SHOWN = ("text",)
+
+
+class Block:
+    """A fenced block: its language, title, text and first line on the page."""
+
+    def __init__(self, page, token):
+        self.language, _, rest = token.info.strip().partition(" ")
+        title = TITLE.search(rest)
+        self.title, self.text, self.line = title[1] if title else "", token.content, token.map[0] + 2
+        self.place = f"{page}:{self.line}"
+        self.is_run = not NOT_RUN.fullmatch(self.title)
+        # the scripts of examples/, shown on a page of their own, run in test_examples.py
+        self.is_included = self.text.lstrip().startswith("--8<--")
+
+
+def blocks(page):
+    """All fenced blocks of a page."""
+    tokens = MarkdownIt().parse((ROOT / page).read_text(encoding="utf-8"))
+    return [Block(page, token) for token in tokens if token.type == "fence"]
+
+
+def command_lines(text):
+    """Commands of a shell block as lists of words, comments left out."""
+    lines = (shlex.split(line, comments=True) for line in text.replace("\\\n", " ").splitlines())
+    return [words for words in lines if words]
+
+
+def is_gush(words):
+    """Whether a command is ours, from a clone or installed."""
+    return words[0] in ("./gush", "gush")
+
+
+def parse(words, place):
+    """Fail unless `gush` knows the command and all its options."""
+    group = typer.main.get_command(app)
+    name, *rest = words[1:]
+    assert name in group.commands or name in ("--version", "--help"), f"{place}: gush {name}: no such command"
+    try:
+        if name in group.commands:
+            group.commands[name].make_context(name, rest)
+    except typer.Exit as done:
+        assert done.exit_code == 0, place
+    except Exception as problem:  # whatever class the parser has in this version of typer
+        pytest.fail(f"{place}: {shlex.join(words)}: {problem}")
+
+
+def execute(words, place):
+    """Run one command of a shell block."""
+    if not is_gush(words):
+        subprocess.run(words, check=True)
+        return
+    parse(words, place)
+    try:
+        code = app(words[1:], standalone_mode=False)
+    except typer.Exit as end:
+        code = end.exit_code
+    assert not code, f"{place}: {shlex.join(words)}: exit code {code}"
+
+
+def read_toml(block):
+    """A TOML block must mean something: scene, study or limits; a file name as title saves it for the page."""
+    data = tomllib.loads(block.text)
+    if block.title:
+        assert FILE_NAME.fullmatch(block.title), f"{block.place}: title must be a file name, got {block.title!r}"
+        Path(block.title).write_text(block.text, encoding="utf-8")
+    if "parameters" in data:
+        from coupling.studies.design import cases, load_study
+
+        assert cases(load_study(data)), block.place
+    elif "base" in data:
+        path = Path("scene-of-a-page.toml")
+        path.write_text(block.text, encoding="utf-8")
+        coupling.load_scene(path)
+    else:
+        structure.Limits.model_validate(data)
+
+
+def follow(page):
+    """Do in the current folder what a page says."""
+    names = {"__name__": "__main__"}
+    for block in blocks(page):
+        if block.language in SHOWN or block.is_included:
+            continue
+        if block.language == "bash":
+            for words in command_lines(block.text):
+                if block.is_run:
+                    execute(words, block.place)
+                elif is_gush(words):
+                    parse(words, block.place)
+        elif block.language == "toml":
+            read_toml(block)
+        elif block.language == "python":
+            # line numbers of the page, so that a traceback points into it
+            code = compile("\n" * (block.line - 1) + block.text, str(ROOT / page), "exec")
+            if block.is_run:
+                exec(code, names)
+        else:
+            pytest.fail(f"{block.place}: a block must name its language, one of bash, toml, python, text")
+
+
+@pytest.fixture(scope="module")
+def followed(tmp_path_factory):
+    """The folder that the tutorial leaves."""
+    folder = tmp_path_factory.mktemp("tutorial")
+    with contextlib.chdir(folder), matplotlib.rc_context():
+        follow(TUTORIAL)
+    return folder
+
+
+def test_tutorial_makes_what_it_shows(followed):
+    figures = {path.name for path in (followed / "runs/quick/figures").iterdir()}
+    shown = re.findall(r"^\*`(\w+\.png)`", (ROOT / TUTORIAL).read_text(encoding="utf-8"), re.MULTILINE)
+    assert shown and set(shown) <= figures
+    assert (followed / "runs/quick/report.html").is_file()
+    assert coupling.read_run(followed / "runs/mine").attrs["status"] == "finished"
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page != TUTORIAL and blocks(page)])
+def test_page_works(page, followed, tmp_path, monkeypatch):
+    shutil.copytree(followed, tmp_path / "here")
+    monkeypatch.chdir(tmp_path / "here")
+    monkeypatch.setattr(structure.models, "_REGISTERED", {})
+    with matplotlib.rc_context():
+        follow(page)
+
+
+def test_docstring_examples_hold():
+    attempted = 0
+    for package in ("mpm", "structure", "coupling"):
+        root = importlib.import_module(package)
+        names = [package, *(m.name for m in pkgutil.walk_packages(root.__path__, f"{package}."))]
+        for name in names:
+            result = doctest.testmod(importlib.import_module(name), optionflags=doctest.ELLIPSIS)
+            assert result.failed == 0, name
+            attempted += result.attempted
+    assert attempted >= 10
+
+
+def test_every_report_of_the_site_is_a_page_or_is_made_by_a_command_that_exists():
+    text = (ROOT / "scripts/docs_hooks.py").read_text(encoding="utf-8")
+    commands = re.findall(r'"(gush [\w -]+)"\)', text)
+    assert len(commands) == 4
+    for command in commands:
+        parse(command.split(), "scripts/docs_hooks.py")
+
+
+def test_nothing_on_the_site_comes_from_a_network():
+    config = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    assert "font: false" in config and "https://" not in config
+    for page in PAGES:
+        images = re.findall(r"!\[[^\]]*\]\(([^)]*)\)", (ROOT / page).read_text(encoding="utf-8"))
+        assert not [image for image in images if "//" in image], page
+        for image in images:
+            assert ((ROOT / page).parent / image).is_file(), f"{page}: {image}"
+    assert os.path.getsize(ROOT / "docs/assets/iframe-worker.js") > 1000

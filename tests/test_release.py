@@ -1,0 +1,37 @@
+"""One version, one licence, wherever they are stated; scripts/check_release.sh checks what a release holds."""
+
+import re
+import tomllib
+from importlib.metadata import version
+from pathlib import Path
+
+from typer.testing import CliRunner
+
+from coupling.cli import app
+
+ROOT = Path(__file__).parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+CITATION = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+
+
+def test_version_is_the_same_everywhere():
+    result = CliRunner().invoke(app, ["--version"])
+    assert (result.exit_code, result.output) == (0, f"gush {PROJECT['version']}\n")
+    assert version(PROJECT["name"]) == PROJECT["version"]
+    assert re.search(r"^version: (.*)$", CITATION, re.MULTILINE)[1] == PROJECT["version"]
+
+
+def test_licence_is_the_same_everywhere():
+    assert (ROOT / "LICENSE").read_text(encoding="utf-8").startswith(f"{PROJECT['license']} License")
+    assert re.search(r"^license: (.*)$", CITATION, re.MULTILINE)[1] == PROJECT["license"]
+
+
+def test_citation_file_names_the_study_that_is_reproduced():
+    # the schema's required keys (citation-file-format 1.2.0), and the article
+    for key in ("cff-version: 1.2.0", "message:", "title:", "authors:"):
+        assert re.search(f"^{key}", CITATION, re.MULTILINE), key
+    assert "water-soil gushing" in CITATION
+
+
+def test_every_dependency_has_a_lower_bound():
+    assert all(">=" in dependency for dependency in PROJECT["dependencies"])
