@@ -120,7 +120,7 @@ class KernelCache(FunctionCache):
                 return cls()
 
         class Impl(CompileResultCacheImpl):
-            _locator_classes = [Locator]
+            _locator_classes = (Locator,)
 
         self._impl_class = Impl
         super().__init__(function)
