@@ -36,7 +36,7 @@ def test_bytes_of_a_point_are_two_passes_over_its_row_order_and_soil(solver):
 
 def test_operations_are_those_of_the_loop_over_points():
     source = (
-        "for j in range(start[e], start[e + 1]):\n    a = b * c + d\n    a += 2.0 / b\n    if a > b:\n        a = -a\n"
+        "for j in range(start[e], start[e + 1]):\n    a = b * c + d\n    a += 2.0 / b\n    if a > b:\n        a = 0"
     )
     loop = layout.ast.parse(source).body[0]
     assert layout._over_points(loop)
