@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from coupling.exit_codes import DIFFERENT, JsonPath, checked_json, failures, warn, write_json
-from coupling.measure_commands import accuracy_command, stability_command, study_command
+from coupling.measure_commands import accuracy_command, bench_command, stability_command, study_command
 from coupling.result_commands import export_command, info_command, report_command
 
 app = typer.Typer(
@@ -261,33 +261,10 @@ def scenes_command(json_path: JsonPath = None):
             Console().print(table)
 
 
-@app.command("bench")
-def bench_command(
-    json_path: JsonPath = None,
-    scene: Annotated[str, typer.Option(help="Scene whose step is measured.")] = "case-3",
-):
-    """Point-steps per CPU second of one core, beside a plain reference loop in the same process.
-
-    JSON: step_points_per_second, reference_points_per_second, step_to_reference_ratio and the keys of
-    `coupling.bench.bench`.
-    """
-    with failures(), checked_json(json_path):
-        from coupling.bench import bench
-        from coupling.scene import load_scene
-
-        data = bench(load_scene(scene))
-        write_json(json_path, data)
-        if str(json_path) != "-":
-            table = Table("point-steps per CPU second", "million", title=f"{data['scene']}, {data['points']} points")
-            table.add_row("two-phase step of this program", f"{data['step_points_per_second'] / 1e6:.2f}")
-            table.add_row("plain one-phase reference loop", f"{data['reference_points_per_second'] / 1e6:.2f}")
-            table.add_row("ratio", f"{data['step_to_reference_ratio']:.2f}")
-            Console().print(table)
-
-
 app.command("report")(report_command)
 app.command("export")(export_command)
 app.command("info")(info_command)
+app.command("bench")(bench_command)
 app.command("accuracy")(accuracy_command)
 app.command("study")(study_command)
 app.command("stability")(stability_command)

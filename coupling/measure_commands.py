@@ -40,6 +40,61 @@ def accuracy_command(
             console.print(f"page: {data['page']}", highlight=False, soft_wrap=True)
 
 
+def bench_command(
+    scene: Annotated[str, typer.Option(help="Scene whose step is measured.")] = "case-3",
+    step: Annotated[bool, typer.Option("--step", help="Only the step beside the reference loop.")] = False,
+    large: Annotated[bool, typer.Option("--large", help="Also three million points.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Folder for the page, its data and figure.")] = None,
+    json_path: JsonPath = None,
+):
+    """What steps, sizes, starts and runs at once cost, beside a plain reference loop and a copy of memory.
+
+    JSON: step_points_per_second, reference_points_per_second, step_to_reference_ratio and the other keys of
+    `coupling.bench.command.bench`; `files`.
+    """
+    if step and out is not None:
+        raise typer.BadParameter("--step measures too little for a page; leave out --step or --out")
+    with failures(), checked_json(json_path):
+        from coupling.bench.command import bench
+        from coupling.bench.report import write
+        from coupling.scene import load_scene
+
+        data = bench(load_scene(scene), step, large, Console(stderr=True).print)
+        data["files"] = write(data, out) if out is not None else []
+        write_json(json_path, data)
+        if str(json_path) != "-":
+            console = Console()
+            console.print(_bench_table(data))
+            for path in data["files"]:
+                console.print(path, highlight=False, soft_wrap=True)
+
+
+def _bench_table(data):
+    table = Table("measured", "", title=f"{data['scene']}, {data['points']} points, load {data['load'][0]:.1f}")
+    for name, value in (
+        ("two-phase step of this program", data["step_points_per_second"]),
+        ("plain one-phase reference loop", data["reference_points_per_second"]),
+        ("bound by memory, bytes as counted", data["roofline_points_per_second"]),
+        *((row["configuration"], row["points_per_second"]) for row in data.get("configurations", ())),
+        *((f"{row['points']} points in a box", row["points_per_second"]) for row in data.get("sizes", ())),
+    ):
+        table.add_row(name, f"{value / 1e6:.2f} M point-steps per CPU s")
+    table.add_row("step over reference", f"{data['step_to_reference_ratio']:.2f}")
+    for name, seconds in data["kernels"].items():
+        table.add_row(f"kernel {name}", f"{1e9 * seconds:.1f} ns a point-step")
+    table.add_row("memory", f"{data['bytes_per_point']:.0f} bytes a point")
+    if "start" in data:
+        table.add_row("cost over size", f"power {data['size_slope']:.2f}")
+        table.add_row(
+            f"{data['threads'][-1]['threads']} threads", f"{data['threads'][-1]['speed_up']:.2f} times as fast"
+        )
+        table.add_row("first step of gush run quick, warm", f"{data['first_step_wall_seconds']:.1f} s by the clock")
+        table.add_row("compilation", f"{data['start']['compilation']:.1f} CPU s, once")
+        share = data["throughput"]
+        table.add_row(f"{share['runs']} runs at once", f"{share['share_of_ideal']:.2f} of the ideal throughput")
+    return table
+
+
 def stability_command(
     case: Annotated[list[str] | None, typer.Argument(help="Extremes to run; * for any ending; all if none.")] = None,
     linear: Annotated[bool, typer.Option("--linear", help="Only the linear analysis of the time step.")] = False,

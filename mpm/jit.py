@@ -1,45 +1,25 @@
-"""The kernel decorator: one place for numba's options and for where compiled kernels are kept.
-
-numba's own cache ignores edits in other modules and its compile options, so the cache folder is
-keyed by a hash of every kernel source of this package, of the options and of numba's version.
-"""
-
-import hashlib
-import os
-import tempfile
-from pathlib import Path
+"""The kernel decorator: one place for numba's options."""
 
 import numba
-import platformdirs
+
+from mpm.kernel_cache import KernelCache, kernel_folder, variant_name
 
 # contract: fused multiply-add; nsz, arcp: harmless reordering. No "nnan" or "ninf": the
 # non-finite check of the solver relies on NaN keeping its meaning.
 FAST_MATH = {"contract", "nsz", "arcp"}
-OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": FAST_MATH, "cache": True}
+OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": FAST_MATH}
+FOLDER = kernel_folder({**OPTIONS, "fastmath": sorted(FAST_MATH)})
 
 
-def kernel_cache_folder():
-    """Return a writable folder for compiled kernels, keyed by the kernel sources [Path]."""
-    digest = hashlib.sha256(f"{numba.__version__} {sorted(FAST_MATH)}".encode())
-    for source in sorted(Path(__file__).parent.rglob("*.py")):
-        digest.update(source.read_bytes())
-    key = digest.hexdigest()[:16]
-    for base in (Path(platformdirs.user_cache_dir("gushing")), Path(tempfile.gettempdir()) / f"gushing-{os.getuid()}"):
-        folder = base / "kernels" / key
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError:
-            continue
-        if os.access(folder, os.W_OK):
-            return folder
-    return None
+def kernel(function, **options):
+    """Compile a function of arrays and numbers when it is first called, once for all processes."""
+    function.__qualname__ = variant_name(function)
+    compiled = numba.njit(**OPTIONS, **options)(function)
+    if FOLDER is not None:
+        compiled._cache = KernelCache(function, FOLDER)
+    return compiled
 
 
-_folder = kernel_cache_folder()
-if _folder is None:
-    OPTIONS["cache"] = False  # nowhere to write: compile in memory each time
-elif not os.environ.get("NUMBA_CACHE_DIR"):
-    numba.config.CACHE_DIR = str(_folder)
-
-kernel = numba.njit(**OPTIONS)
-inline_kernel = numba.njit(inline="always", **OPTIONS)
+def inline_kernel(function):
+    """A kernel that is written out where others call it."""
+    return kernel(function, inline="always")

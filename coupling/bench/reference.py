@@ -1,6 +1,6 @@
-"""Cost of a point-step: the full two-phase solver beside a plain single-phase loop in the same process.
+"""What the solver is measured against in the same process: a plain single-phase loop, and a copy of memory.
 
-The reference is what a textbook MLS-MPM code does per point and step: quadratic B-splines on a square grid, APIC
+The loop is what a textbook MLS-MPM code does per point and step: quadratic B-splines on a square grid, APIC
 transfer, a weakly compressible fluid; one phase, one stress number, no contact. Source: Hu et al. (2018), the 88-line
 program that comes with it.
 """
@@ -11,65 +11,17 @@ import time as clock
 import numba
 import numpy as np
 
-ROUNDS = 3
-SECONDS_A_ROUND = 3.0
-WARM_UP_STEPS = 120  # more than the solver goes between sorting its points
 
-
-def bench(scene, rounds=ROUNDS, seconds=SECONDS_A_ROUND):
-    """Measure processor time of stepping, one thread, in turns with the reference loop.
-
-    Parameters
-    ----------
-    scene : coupling.Scene
-        Gate open, from the geostatic state.
-    rounds : int
-        The best of them counts: other programs only ever slow one down.
-    seconds : float
-        Processor time of each part of a round [s].
-
-    Returns
-    -------
-    dict
-        step_points_per_second, reference_points_per_second: point-steps per second of processor time;
-        step_to_reference_ratio; scene, points, elements, rounds; step_rounds, reference_rounds: all measurements.
-    """
-    import mpm
-
-    mesh = mpm.build_mesh(scene.mpm)
-    solver = mpm.Solver(scene.mpm, mesh, threads=1)
-    solver.open_gate()
-    reference = ReferenceLoop(solver.n_points)
-    for _ in range(WARM_UP_STEPS):
-        solver.step()
-        reference.step()
-    step_rounds, reference_rounds = [], []
+def copy_bandwidth(megabytes=256, rounds=3):
+    """Bytes read and written per second of processor time by one thread that copies an array larger than the cache."""
+    source = np.ones(megabytes * 125_000)
+    target = np.zeros_like(source)
+    best = math.inf
     for _ in range(rounds):
-        before = solver.point_steps
-        _, used = _timed(solver.step, seconds)
-        step_rounds.append((solver.point_steps - before) / used)
-        count, used = _timed(reference.step, seconds)
-        reference_rounds.append(count * solver.n_points / used)
-    return {
-        "step_points_per_second": max(step_rounds),
-        "reference_points_per_second": max(reference_rounds),
-        "step_to_reference_ratio": max(step_rounds) / max(reference_rounds),
-        "scene": scene.name,
-        "points": int(solver.n_points),
-        "elements": len(mesh.elements),
-        "rounds": rounds,
-        "step_rounds": step_rounds,
-        "reference_rounds": reference_rounds,
-    }
-
-
-def _timed(step, seconds):
-    """Repeat `step` for some processor time; returns (count, processor seconds)."""
-    count, begin = 0, clock.process_time()
-    while clock.process_time() - begin < seconds:
-        step()
-        count += 1
-    return count, clock.process_time() - begin
+        begin = clock.process_time()
+        target[:] = source
+        best = min(best, clock.process_time() - begin)
+    return 2 * source.nbytes / best
 
 
 class ReferenceLoop:

@@ -1,0 +1,94 @@
+"""Processor time of whole steps and of their kernels, for what a scene has and has not."""
+
+import time as clock
+
+SECONDS_OF_WARM_UP = 0.5
+
+
+def configurations(scene):
+    """Name and `mpm.Scene` of the configurations measured: all of the scene, and parts left out."""
+    elastic = tuple(soil.model_copy(update={"model": "elastic"}) for soil in scene.soils)
+
+    def numerics(**changes):
+        return scene.numerics.model_copy(update=changes)
+
+    rough = {"volumetric_smoothing": False}
+    yield "two-phase, Mohr-Coulomb", scene
+    yield "two-phase, Mohr-Coulomb, no smoothing", scene.model_copy(update={"numerics": numerics(**rough)})
+    yield "two-phase, elastic", scene.model_copy(update={"soils": elastic})
+    yield "dry, Mohr-Coulomb", scene.model_copy(update={"water": None})
+    yield "dry, elastic", scene.model_copy(update={"water": None, "soils": elastic})
+    if hasattr(scene.numerics, "local_time_stepping"):
+        one = {"local_time_stepping": False}
+        yield "two-phase, Mohr-Coulomb, one time step", scene.model_copy(update={"numerics": numerics(**one)})
+
+
+def prepared(mpm_scene, mesh, threads=1):
+    """A solver with its gate open that has stepped until its kernels are compiled and its points are spread."""
+    import mpm
+
+    solver = mpm.Solver(mpm_scene, mesh, threads)
+    if mpm_scene.gate is not None:
+        solver.open_gate()
+    solver.step()
+    timed(solver.step, SECONDS_OF_WARM_UP)
+    return solver
+
+
+def timed(step, seconds):
+    """Repeat `step` for some processor time, at least twice; returns (count, processor seconds, wall seconds)."""
+    count, begin, wall = 0, clock.process_time(), clock.perf_counter()
+    while clock.process_time() - begin < seconds or count < 2:
+        step()
+        count += 1
+    return count, clock.process_time() - begin, clock.perf_counter() - wall
+
+
+def rate(solver, seconds):
+    """Point-steps per processor second and per wall second of a solver, and simulated seconds per processor second."""
+    points, time = solver.point_steps, solver.time
+    _, used, wall = timed(solver.step, seconds)
+    done = solver.point_steps - points
+    return done / used, done / wall, (solver.time - time) / used
+
+
+#: Methods of the solver that a step calls only now and then, and what they are called in the table.
+OCCASIONAL = {"_relocate": "order after relocation", "_sort_physically": "sorting", "_update_wave_speed": "spectrum"}
+
+
+def kernel_times(solver, seconds):
+    """Processor time of each kernel per point-step [s], the rest of a step as "python", of a solver on one thread.
+
+    Kernels are timed by the name of their function, so this follows whatever a step calls.
+    """
+    used, inner = {}, [0.0]
+
+    def measured(function, name):
+        def call(*arguments, **options):
+            inner.append(0.0)
+            begin = clock.process_time()
+            result = function(*arguments, **options)
+            spent = clock.process_time() - begin
+            used[name] = used.get(name, 0.0) + spent - inner.pop()
+            inner[-1] += spent
+            return result
+
+        return call
+
+    def over(cuts, kernel, arguments, per_range, plain=solver._over):
+        return plain(cuts, measured(kernel, kernel.py_func.__name__), arguments, per_range)
+
+    relocate = solver._relocate_points
+    solver._over, solver._relocate_points = over, measured(relocate, "relocate")
+    for method, name in OCCASIONAL.items():
+        setattr(solver, method, measured(getattr(solver, method), name))
+    points = solver.point_steps
+    try:
+        _, total, _ = timed(solver.step, seconds)
+    finally:
+        solver._relocate_points = relocate
+        for name in ("_over", *OCCASIONAL):
+            delattr(solver, name)
+    used["python"] = total - sum(used.values())
+    done = solver.point_steps - points
+    return {name: spent / done for name, spent in sorted(used.items(), key=lambda item: -item[1])}

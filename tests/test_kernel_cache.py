@@ -1,0 +1,101 @@
+"""Compiled kernels are kept for other processes, are never another variant's, and are not needed."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+VARIANTS = """
+import sys
+from mpm.jit import kernel
+def scaled(factor):
+    @kernel
+    def inner(x):
+        return factor * x
+    @kernel
+    def scale(x):
+        return 2.0 * inner(x)
+    return scale
+for factor in map(float, sys.argv[1:]):
+    scale = scaled(factor)
+    assert scale(1.0) == 2.0 * factor, scale(1.0)
+    print("compiled" if scale.stats.cache_misses else "kept")
+"""
+EVENT = """
+import mpm
+import mpm.contact, mpm.points, mpm.stages, mpm.transfer
+import sys; sys.path.insert(0, "tests")
+from small_event import small_scene
+scene = small_scene().mpm
+solver = mpm.Solver(scene, mpm.build_mesh(scene), threads=1)
+solver.relax()
+solver.open_gate()
+for _ in range(40):
+    solver.step()
+solver._relocate(solver.levels.count - 1)
+kernels = [v for m in (mpm.contact, mpm.points, mpm.stages, mpm.transfer) for v in vars(m).values()]
+kernels += [v for v in vars(solver).values()]
+kernels = {k.py_func.__qualname__: k for k in kernels if hasattr(k, "py_func")}
+print(len(kernels), max(len(k.signatures) for k in kernels.values()),
+      *(name for name, k in kernels.items() if k.stats.cache_misses))
+"""
+
+
+@pytest.fixture
+def program(tmp_path):
+    """Starts a process whose kernels are kept in a folder of the test; the code stands in a file, as kernels do."""
+    path = tmp_path / "variants.py"
+    path.write_text(VARIANTS)
+
+    def start(*arguments, cache=tmp_path / "cache", **environment):
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(cache), **environment}
+        return subprocess.Popen(
+            [sys.executable, path, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            env={name: value for name, value in environment.items() if value},
+        )  # fmt: skip
+
+    return start
+
+
+def printed(process):
+    out, error = process.communicate()
+    assert process.returncode == 0, error
+    return out.split()
+
+
+def test_processes_that_compile_at_once_get_their_own_variant(program, tmp_path):
+    for process in [program("3"), program("5")]:
+        printed(process)
+    assert printed(program("5", "3")) == ["kept", "kept"]
+    assert len(list((tmp_path / "cache").rglob("*scale_*.nbc"))) == 2
+
+
+def test_damaged_kernels_are_compiled_again(program, tmp_path):
+    printed(program("3"))
+    for file in (tmp_path / "cache").rglob("*.nb?"):
+        file.write_bytes(file.read_bytes()[:40])
+    assert printed(program("3")) == ["compiled"]
+    assert printed(program("3")) == ["kept"]
+
+
+def test_home_that_cannot_be_written_is_not_needed(program, tmp_path):
+    (tmp_path / "file").write_text("")
+    blocked = str(tmp_path / "file" / "home")
+    (tmp_path / "temporary").mkdir()
+    elsewhere = {"cache": "", "HOME": blocked, "XDG_CACHE_HOME": blocked, "TMPDIR": str(tmp_path / "temporary")}
+    assert printed(program("3", **elsewhere)) == ["compiled"]
+    assert printed(program("3", **elsewhere)) == ["kept"]  # in the folder for temporary files
+    assert printed(program("3", cache=blocked)) == ["compiled"]  # in memory only
+
+
+def test_every_kernel_is_compiled_once_for_all_processes_and_for_one_signature():
+    """A kernel for two signatures costs a user seconds more, and one that is not found again every run as many."""
+    for _ in range(2):
+        run = subprocess.run([sys.executable, "-c", EVENT], cwd=ROOT, capture_output=True, text=True, check=True)
+        count, signatures, *compiled = run.stdout.split()
+    assert compiled == []
+    assert int(count) > 10
+    assert int(signatures) == 1
