@@ -6,6 +6,7 @@ uniform theta grid), `/history` (inflow, zones, balances, time step), `/points` 
 """
 
 import contextlib
+import hashlib
 import io
 import math
 import os
@@ -16,11 +17,14 @@ from pathlib import Path
 import numpy as np
 
 from coupling.journal import changed, put_in_place, readable, recover, replace_file
+from coupling.provenance import with_history
 from mpm.variables import CLAMPS, POINT_VARIABLES
 
 STATUSES = ("running", "finished", "failed", "interrupted")
 DT_LIMITS = ("acoustic", "advective", "output", "other")
 SECONDS_BETWEEN_WRITES = 1.0
+#: HDF5 format with checksums on its structure, read by netCDF-C too; those of the data are asked for by each variable.
+CHECKED_FORMAT = ("v110", "v110")
 
 #: Variables on (time, [tunnel,] theta): name to (units, long_name). Interval means, resampled conservatively.
 PRESSURES = {
@@ -213,7 +217,7 @@ class RunWriter:
         import h5netcdf
 
         image = io.BytesIO()
-        with h5netcdf.File(image, "w") as file:
+        with h5netcdf.File(image, "w", libver=CHECKED_FORMAT) as file:
             for name, value in {**attributes, "status": "running", "status_message": ""}.items():
                 file.attrs[name] = value
             space = ("tunnel", "theta") if self._n_tunnels > 1 else ("theta",)
@@ -228,7 +232,7 @@ class RunWriter:
                 theta = _variable(lining, "theta", ("theta",), "f8", ("degree", "angle from the crown, clockwise"))
                 theta[:] = cell_centres()
                 theta.attrs["bounds"] = "theta_bnds"
-                lining.create_variable("theta_bnds", ("theta", "bound"), "f8")[:] = cell_bounds()
+                lining.create_variable("theta_bnds", ("theta", "bound"), "f8", fletcher32=True)[:] = cell_bounds()
                 shape = (16, *([self._n_tunnels] if self._n_tunnels > 1 else []), 360)
                 for name, meaning in PRESSURES.items():
                     variable = _variable(lining, name, ("time", *space), "f8", meaning, shape)
@@ -253,7 +257,8 @@ class RunWriter:
         for key, value in attributes.items():
             group.attrs[key] = value
         group.dimensions["time"] = None
-        _variable(group, "time", ("time",), "f8", ("s", "time since the gate opened"), (256,), fill=np.nan)
+        time = _variable(group, "time", ("time",), "f8", ("s", "time since the gate opened"), (256,), fill=np.nan)
+        del time.attrs["_FillValue"]  # CF knows no missing coordinates: rows without a time are not there yet
         return group
 
     def _write_lining(self, group, batch):
@@ -340,14 +345,31 @@ def write_response(path, response, model="beam-spring"):
     beside = path.with_name(f"{path.name}.tmp")
     try:
         shutil.copy(path, beside)
-        with h5py.File(beside, "a", locking=False) as file:
+        with h5py.File(beside, "a", locking=False, libver=CHECKED_FORMAT) as file:
             structure = file.require_group("structure")
             if model in structure:
                 del structure[model]
-        response.to_netcdf(beside, mode="a", group=f"structure/{model}", engine="h5netcdf")
+        write_dataset(beside, response, f"structure/{model}")
         put_in_place(beside, path)
     finally:
         beside.unlink(missing_ok=True)
+
+
+def write_dataset(path, dataset, group=None):
+    """Write a dataset with checksums: into a new file, or as a group more into one whose history gets a line."""
+    import h5netcdf
+    from xarray.backends import H5NetCDFStore
+
+    mode, options = "w" if group is None else "a", {"driver_kwds": {"libver": CHECKED_FORMAT}}
+    # CF knows no missing coordinates, and a missing value is NaN here without being told
+    encoding = {
+        name: {"fletcher32": variable.ndim > 0, "_FillValue": None} for name, variable in dataset.variables.items()
+    }
+    with H5NetCDFStore.open(path, mode=mode, group=group, **options) as store:
+        dataset.dump_to_store(store, encoding=encoding)
+    if group is not None:
+        with h5netcdf.File(path, "r+", libver=CHECKED_FORMAT) as file:
+            file.attrs["history"] = with_history(file.attrs.get("history", ""), f"/{group} computed")
 
 
 def _write_mesh(group, mesh, geometry):
@@ -366,7 +388,7 @@ def _write_mesh(group, mesh, geometry):
 
 def _variable(group, name, dimensions, kind, meaning, chunks=None, fill=None, compress=False):
     options = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if compress else {}
-    variable = group.create_variable(name, dimensions, kind, chunks=chunks, fillvalue=fill, **options)
+    variable = group.create_variable(name, dimensions, kind, chunks=chunks, fillvalue=fill, fletcher32=True, **options)
     variable.attrs["units"], variable.attrs["long_name"] = meaning
     return variable
 
@@ -375,7 +397,7 @@ def _variable(group, name, dimensions, kind, meaning, chunks=None, fill=None, co
 def _append_to(path):
     import h5netcdf
 
-    with changed(path) as whole, h5netcdf.File(whole, "r+") as file:
+    with changed(path) as whole, h5netcdf.File(whole, "r+", libver=CHECKED_FORMAT) as file:
         yield file
 
 
@@ -513,11 +535,21 @@ def _read(file, group, row=None):
                     if not dataset.sizes["time"]:
                         raise RunFileError(f"run file '{file}': group '{group}' has no complete record yet")
                     dataset = dataset.isel(time=row)
+            if "scene_sha256" in dataset.attrs:
+                _check_scene(file, dataset.attrs)
             return dataset.load()
     except RunFileError:
         raise
     except Exception as error:
         raise RunFileError(_why_unreadable(file, group, error)) from error
+
+
+def _check_scene(file, attributes):
+    # texts are the one thing that HDF5 keeps without a checksum
+    if hashlib.sha256(str(attributes.get("scene", "")).encode()).hexdigest() != attributes["scene_sha256"]:
+        raise RunFileError(
+            f"run file '{file}': damaged, its scene does not match scene_sha256; copy it again or repeat the run"
+        )
 
 
 @contextlib.contextmanager
@@ -544,7 +576,7 @@ def _why_unreadable(file, group, error):
         return (
             f"run file '{file}': truncated, its end is missing ({size} bytes are left); copy it again or repeat the run"
         )
-    if group is not None and ("group not found" in str(error).lower() or isinstance(error, (KeyError, OSError))):
+    if group is not None and ("group not found" in str(error).lower() or isinstance(error, KeyError)):
         return f"run file '{file}': has no group '/{group}'; " + (
             "run `gush respond` first" if group.startswith("structure") else "it is not a run file, or it is damaged"
         )

@@ -41,6 +41,7 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int) 
     import tomllib
 
     from coupling.datasets import read_history, read_pressures, write_response
+    from coupling.provenance import root_attributes
     from coupling.run import respond, run
     from coupling.run_folder import RUN_FILE
     from coupling.scene import make_scene
@@ -62,7 +63,7 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int) 
         write_response(run_folder / RUN_FILE, responses[name], name)
     last = scene.mpm.stop.inflow_mass or float(history["inflow_mass"].values[-1])
     result = at_inflow_masses(pressures, history, responses, np.linspace(0.0, last, records))
-    result.attrs["scene"] = source
+    result.attrs = root_attributes(scene)
     waiting = place / f"{CASE_FILE}.{os.getpid()}"
     result.to_netcdf(waiting, engine="h5netcdf")
     waiting.replace(done)
