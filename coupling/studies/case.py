@@ -38,19 +38,18 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int) 
     mpm.RunFailed, structure.LiningFailure, coupling.run_folder.RunRefused
         As :func:`coupling.run`; the study goes on without the case.
     """
-    import tomllib
 
     from coupling.datasets import read_history, read_pressures, write_response
     from coupling.provenance import root_attributes
     from coupling.run import respond, run
     from coupling.run_folder import RUN_FILE
-    from coupling.scene import make_scene
+    from coupling.scene import parse_scene
 
     place = Path(folder)
     done = place / CASE_FILE
     if done.is_file():
         return str(done)
-    scene = make_scene(tomllib.loads(source), str(place))
+    scene = parse_scene(source, str(place))
     place.mkdir(parents=True, exist_ok=True)
     run_folder = place / RUN_FOLDER
     run(scene, run_folder, overwrite=True, threads=1)
