@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from coupling.journal import changed, put_in_place, readable, recover, replace_file
+from coupling.own_content import ForeignContent, require_own_content
 from coupling.provenance import with_history
 from mpm.variables import CLAMPS, POINT_VARIABLES
 
@@ -345,11 +346,12 @@ def write_response(path, response, model="beam-spring"):
     beside = path.with_name(f"{path.name}.tmp")
     try:
         shutil.copy(path, beside)
-        with h5py.File(beside, "a", locking=False, libver=CHECKED_FORMAT) as file:
-            structure = file.require_group("structure")
-            if model in structure:
-                del structure[model]
-        write_dataset(beside, response, f"structure/{model}")
+        with _damage_named(path):
+            with h5py.File(beside, "a", locking=False, libver=CHECKED_FORMAT) as file:
+                structure = file.require_group("structure")
+                if model in structure:
+                    del structure[model]
+            write_dataset(beside, response, f"structure/{model}")
         put_in_place(beside, path)
     finally:
         beside.unlink(missing_ok=True)
@@ -397,8 +399,19 @@ def _variable(group, name, dimensions, kind, meaning, chunks=None, fill=None, co
 def _append_to(path):
     import h5netcdf
 
-    with changed(path) as whole, h5netcdf.File(whole, "r+", libver=CHECKED_FORMAT) as file:
+    with _damage_named(path), changed(path) as whole, h5netcdf.File(whole, "r+", libver=CHECKED_FORMAT) as file:
         yield file
+
+
+@contextlib.contextmanager
+def _damage_named(path):
+    """Turn what the HDF5 library raises in a damaged file into a message; the file is as it was."""
+    try:
+        yield
+    except (OSError, RuntimeError, KeyError) as error:
+        if getattr(error, "errno", None) is not None:
+            raise  # a full disk, a missing right
+        raise RunFileError(_why_unreadable(Path(path), None, error)) from error
 
 
 def _grow_to(group, rows):
@@ -557,6 +570,9 @@ def _shown(file):
     """The file, complete also where a kill left its last change in the journal."""
     shown = readable(file)
     try:
+        require_own_content(shown)
+        if not isinstance(shown, Path):
+            shown.seek(0)
         yield shown
     finally:
         if not isinstance(shown, Path):
@@ -564,6 +580,8 @@ def _shown(file):
 
 
 def _why_unreadable(file, group, error):
+    # a library's message may quote what it met in the file
+    said = "".join(c if c.isprintable() else "?" for c in str(error))[:200]
     try:
         size = os.path.getsize(file)
         with open(file, "rb") as stream:
@@ -572,6 +590,8 @@ def _why_unreadable(file, group, error):
         return f"run file '{file}': cannot be read: {reason.strerror}; check its permissions"
     if signature != b"\x89HDF\r\n\x1a\n":
         return f"run file '{file}': not a netCDF-4 file ({size} bytes); give the run.nc that `gush run` wrote"
+    if isinstance(error, ForeignContent):
+        return f"run file '{file}': must hold its own content, {error}; give the file that `gush run` wrote"
     if "truncated" in str(error) or "eof" in str(error).lower():
         return (
             f"run file '{file}': truncated, its end is missing ({size} bytes are left); copy it again or repeat the run"
@@ -580,4 +600,4 @@ def _why_unreadable(file, group, error):
         return f"run file '{file}': has no group '/{group}'; " + (
             "run `gush respond` first" if group.startswith("structure") else "it is not a run file, or it is damaged"
         )
-    return f"run file '{file}': damaged ({type(error).__name__}: {error}); copy it again or repeat the run"
+    return f"run file '{file}': damaged ({type(error).__name__}: {said}); copy it again or repeat the run"

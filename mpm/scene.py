@@ -127,7 +127,9 @@ class Soil(Part):
                 f"{self.friction_angle:g} deg; the flow rule would create energy"
             )
         if self.model == "mohr-coulomb" and self.friction_angle == 0 and self.cohesion == 0:
-            raise ValueError(f"{who}: friction_angle and cohesion are both 0: no strength at all; give one of them")
+            raise ValueError(
+                f"{who}: friction_angle and cohesion must not both be 0, no strength at all; give one of them"
+            )
         return self
 
 

@@ -86,7 +86,7 @@ def _change(random, lines):
         name = key[1]
         cut = random.randrange(len(name))
         lines[at] = f"{random.choice((*WORDS, name[:cut] + name[cut + 1 :] or 'x'))} = {key[2]}"
-    elif kind == "strange" or not re.fullmatch(r"[-+\d.eE]+", key[2]):
+    elif kind == "strange" or not re.fullmatch(r"-?\d{1,12}\.?\d{0,20}(e[-+]?\d{1,2})?", key[2]):
         lines[at] = f"{key[1]} = {random.choice(STRANGE)}"
     else:
         factor = random.choice((1e3, 1e-3, 1e6, 100.0, 0.01, math.pi / 180, -1.0, 1e12, 1e-12))
