@@ -135,16 +135,26 @@ def rerun_command(
 
 
 @app.command("plan")
-def plan_command(scene: SceneName, threads: Threads = None, json_path: JsonPath = None):
+def plan_command(
+    scene: SceneName,
+    threads: Threads = None,
+    rough: Annotated[bool, typer.Option("--rough", help="From formulas alone, without building the mesh.")] = False,
+    json_path: JsonPath = None,
+):
     """What a run would do and cost: active parts, points, time step, steps, memory, time.
 
-    JSON: keys of `coupling.plan.plan`.
+    JSON: keys of `coupling.plan.plan`, with --rough of `coupling.plan.rough_plan`; and `warnings`.
     """
     with failures(), checked_json(json_path):
-        from coupling.plan import plan
+        from coupling.plan import plan, rough_plan
+        from coupling.plausibility import warnings_of
         from coupling.scene import load_scene
 
-        data = plan(load_scene(scene), threads)
+        loaded = load_scene(scene)
+        warnings = warnings_of(loaded)
+        for warning in warnings:
+            warn(warning)
+        data = {**(rough_plan(loaded) if rough else plan(loaded, threads)), "warnings": warnings}
         write_json(json_path, data)
         if str(json_path) != "-":
             console = Console()
@@ -411,18 +421,24 @@ def _cost_table(data):
     most = "no stop time given" if data["steps_at_most"] is None else f"at most {data['steps_at_most']}"
     table = Table("cost", "", title=f"{data['scene']}: what it costs")
     free = data["free_memory_bytes"]
+    meshed = "nodes" in data
+    if meshed:
+        table.add_row("elements, nodes, points", f"{data['elements']}, {data['nodes']}, {data['points']}")
+        table.add_row("flattest triangle, smallest angle", f"{data['min_altitude']:.3f} m, {data['min_angle']:.0f} deg")
+        table.add_row("time step", f"{1e6 * data['dt']:.0f} µs ({data['dt_limit']})")
+    else:
+        table.add_row("elements, points", f"some {data['elements']}, {data['points']}")
+        table.add_row("time step", f"some {1e6 * data['dt']:.2g} µs")
     for row in (
-        ("elements, nodes, points", f"{data['elements']}, {data['nodes']}, {data['points']}"),
-        ("flattest triangle, smallest angle", f"{data['min_altitude']:.3f} m, {data['min_angle']:.0f} deg"),
-        ("time step", f"{1e6 * data['dt']:.0f} µs ({data['dt_limit']})"),
         ("simulated time", f"about {data['expected_time']:.2g} s (a guess where an inflow mass ends the run)"),
         ("steps", f"about {data['expected_steps']}, {most}"),
         ("records", f"about {data['records']}"),
         ("memory", f"{data['memory_bytes'] / 1e6:.0f} MB" + (f" of {free / 1e9:.1f} GB free" if free else "")),
-        ("speed measured now", f"{data['point_steps_per_second'] / 1e6:.1f} M point-steps/s"),
-        ("time of stepping", f"about {_duration(data['expected_seconds'])}"),
     ):
         table.add_row(*row)
+    if meshed:
+        table.add_row("speed measured now", f"{data['point_steps_per_second'] / 1e6:.1f} M point-steps/s")
+        table.add_row("time of stepping", f"about {_duration(data['expected_seconds'])}")
     return table
 
 

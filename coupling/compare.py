@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coupling.datasets import write_response
+from coupling.datasets import write_dataset, write_response
+from coupling.provenance import origin, with_history
 from coupling.run_folder import RunRefused
 
 FOLDER, DIFFERENCES = "comparison", "differences.nc"
@@ -125,7 +126,7 @@ def store(comparison, source, out=None):
         for name, response in comparison.responses.items():
             write_response(source.file, response, name)
     path = folder / DIFFERENCES
-    comparison.differences.to_netcdf(path, engine="h5netcdf")
+    write_dataset(path, comparison.differences)
     figures = []
     drawings = {"forces": forces_compared(comparison.responses)}
     if next(iter(comparison.responses.values())).sizes["joint"]:
@@ -189,10 +190,16 @@ def _differences(first, second, ring):
             long_name=f"{fields[name].attrs['long_name']}, less the moment of the curved section",
         )
     dataset = xr.Dataset(fields)
-    if "inflow_mass" in first:
-        dataset["inflow_mass"] = first["inflow_mass"]
+    for name in ("inflow_mass", "theta_bnds"):
+        if name in first:
+            dataset[name] = first[name]
     models = f"{second.attrs.get('model', 'second')} less {first.attrs.get('model', 'first')}"
-    dataset.attrs = {"Conventions": "CF-1.11", "title": f"differences between lining models: {models}"}
+    dataset.attrs = {
+        **origin(),
+        "Conventions": "CF-1.11",
+        "title": f"differences between lining models: {models}",
+        "history": with_history("", "lining models compared"),
+    }
     return dataset
 
 

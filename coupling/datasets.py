@@ -6,6 +6,7 @@ uniform theta grid), `/history` (inflow, zones, balances, time step), `/points` 
 """
 
 import contextlib
+import hashlib
 import io
 import math
 import os
@@ -16,11 +17,15 @@ from pathlib import Path
 import numpy as np
 
 from coupling.journal import changed, put_in_place, readable, recover, replace_file
+from coupling.own_content import ForeignContent, require_own_content
+from coupling.provenance import with_history
 from mpm.variables import CLAMPS, POINT_VARIABLES
 
 STATUSES = ("running", "finished", "failed", "interrupted")
 DT_LIMITS = ("acoustic", "advective", "output", "other")
 SECONDS_BETWEEN_WRITES = 1.0
+#: HDF5 format with checksums on its structure, read by netCDF-C too; those of the data are asked for by each variable.
+CHECKED_FORMAT = ("v110", "v110")
 
 #: Variables on (time, [tunnel,] theta): name to (units, long_name). Interval means, resampled conservatively.
 PRESSURES = {
@@ -226,7 +231,7 @@ class RunWriter:
         import h5netcdf
 
         image = io.BytesIO()
-        with h5netcdf.File(image, "w") as file:
+        with h5netcdf.File(image, "w", libver=CHECKED_FORMAT) as file:
             for name, value in {**attributes, "status": "running", "status_message": ""}.items():
                 file.attrs[name] = value
             space = ("tunnel", "theta") if self._n_tunnels > 1 else ("theta",)
@@ -241,7 +246,7 @@ class RunWriter:
                 theta = _variable(lining, "theta", ("theta",), "f8", ("degree", "angle from the crown, clockwise"))
                 theta[:] = cell_centres()
                 theta.attrs["bounds"] = "theta_bnds"
-                lining.create_variable("theta_bnds", ("theta", "bound"), "f8")[:] = cell_bounds()
+                lining.create_variable("theta_bnds", ("theta", "bound"), "f8", fletcher32=True)[:] = cell_bounds()
                 shape = (16, *([self._n_tunnels] if self._n_tunnels > 1 else []), 360)
                 for name, meaning in self._on_theta.items():
                     variable = _variable(lining, name, ("time", *space), "f8", meaning, shape)
@@ -267,7 +272,8 @@ class RunWriter:
         for key, value in attributes.items():
             group.attrs[key] = value
         group.dimensions["time"] = None
-        _variable(group, "time", ("time",), "f8", ("s", "time since the gate opened"), (256,), fill=np.nan)
+        time = _variable(group, "time", ("time",), "f8", ("s", "time since the gate opened"), (256,), fill=np.nan)
+        del time.attrs["_FillValue"]  # CF knows no missing coordinates: rows without a time are not there yet
         return group
 
     def _write_lining(self, group, batch):
@@ -356,14 +362,32 @@ def write_response(path, response, model="beam-spring"):
     beside = path.with_name(f"{path.name}.tmp")
     try:
         shutil.copy(path, beside)
-        with h5py.File(beside, "a", locking=False) as file:
-            structure = file.require_group("structure")
-            if model in structure:
-                del structure[model]
-        response.to_netcdf(beside, mode="a", group=f"structure/{model}", engine="h5netcdf")
+        with _damage_named(path):
+            with h5py.File(beside, "a", locking=False, libver=CHECKED_FORMAT) as file:
+                structure = file.require_group("structure")
+                if model in structure:
+                    del structure[model]
+            write_dataset(beside, response, f"structure/{model}")
         put_in_place(beside, path)
     finally:
         beside.unlink(missing_ok=True)
+
+
+def write_dataset(path, dataset, group=None):
+    """Write a dataset with checksums: into a new file, or as a group more into one whose history gets a line."""
+    import h5netcdf
+    from xarray.backends import H5NetCDFStore
+
+    mode, options = "w" if group is None else "a", {"driver_kwds": {"libver": CHECKED_FORMAT}}
+    # CF knows no missing coordinates, and a missing value is NaN here without being told
+    encoding = {
+        name: {"fletcher32": variable.ndim > 0, "_FillValue": None} for name, variable in dataset.variables.items()
+    }
+    with H5NetCDFStore.open(path, mode=mode, group=group, **options) as store:
+        dataset.dump_to_store(store, encoding=encoding)
+    if group is not None:
+        with h5netcdf.File(path, "r+", libver=CHECKED_FORMAT) as file:
+            file.attrs["history"] = with_history(file.attrs.get("history", ""), f"/{group} computed")
 
 
 def _write_mesh(group, mesh, geometry):
@@ -382,7 +406,7 @@ def _write_mesh(group, mesh, geometry):
 
 def _variable(group, name, dimensions, kind, meaning, chunks=None, fill=None, compress=False):
     options = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if compress else {}
-    variable = group.create_variable(name, dimensions, kind, chunks=chunks, fillvalue=fill, **options)
+    variable = group.create_variable(name, dimensions, kind, chunks=chunks, fillvalue=fill, fletcher32=True, **options)
     variable.attrs["units"], variable.attrs["long_name"] = meaning
     return variable
 
@@ -391,8 +415,19 @@ def _variable(group, name, dimensions, kind, meaning, chunks=None, fill=None, co
 def _append_to(path):
     import h5netcdf
 
-    with changed(path) as whole, h5netcdf.File(whole, "r+") as file:
+    with _damage_named(path), changed(path) as whole, h5netcdf.File(whole, "r+", libver=CHECKED_FORMAT) as file:
         yield file
+
+
+@contextlib.contextmanager
+def _damage_named(path):
+    """Turn what the HDF5 library raises in a damaged file into a message; the file is as it was."""
+    try:
+        yield
+    except (OSError, RuntimeError, KeyError) as error:
+        if getattr(error, "errno", None) is not None:
+            raise  # a full disk, a missing right
+        raise RunFileError(_why_unreadable(Path(path), None, error)) from error
 
 
 def _grow_to(group, rows):
@@ -529,6 +564,8 @@ def _read(file, group, row=None):
                     if not dataset.sizes["time"]:
                         raise RunFileError(f"run file '{file}': group '{group}' has no complete record yet")
                     dataset = dataset.isel(time=row)
+            if "scene_sha256" in dataset.attrs:
+                _check_scene(file, dataset.attrs)
             return dataset.load()
     except RunFileError:
         raise
@@ -536,11 +573,22 @@ def _read(file, group, row=None):
         raise RunFileError(_why_unreadable(file, group, error)) from error
 
 
+def _check_scene(file, attributes):
+    # texts are the one thing that HDF5 keeps without a checksum
+    if hashlib.sha256(str(attributes.get("scene", "")).encode()).hexdigest() != attributes["scene_sha256"]:
+        raise RunFileError(
+            f"run file '{file}': damaged, its scene does not match scene_sha256; copy it again or repeat the run"
+        )
+
+
 @contextlib.contextmanager
 def _shown(file):
     """The file, complete also where a kill left its last change in the journal."""
     shown = readable(file)
     try:
+        require_own_content(shown)
+        if not isinstance(shown, Path):
+            shown.seek(0)
         yield shown
     finally:
         if not isinstance(shown, Path):
@@ -548,6 +596,8 @@ def _shown(file):
 
 
 def _why_unreadable(file, group, error):
+    # a library's message may quote what it met in the file
+    said = "".join(c if c.isprintable() else "?" for c in str(error))[:200]
     try:
         size = os.path.getsize(file)
         with open(file, "rb") as stream:
@@ -556,12 +606,14 @@ def _why_unreadable(file, group, error):
         return f"run file '{file}': cannot be read: {reason.strerror}; check its permissions"
     if signature != b"\x89HDF\r\n\x1a\n":
         return f"run file '{file}': not a netCDF-4 file ({size} bytes); give the run.nc that `gush run` wrote"
+    if isinstance(error, ForeignContent):
+        return f"run file '{file}': must hold its own content, {error}; give the file that `gush run` wrote"
     if "truncated" in str(error) or "eof" in str(error).lower():
         return (
             f"run file '{file}': truncated, its end is missing ({size} bytes are left); copy it again or repeat the run"
         )
-    if group is not None and ("group not found" in str(error).lower() or isinstance(error, (KeyError, OSError))):
+    if group is not None and ("group not found" in str(error).lower() or isinstance(error, KeyError)):
         return f"run file '{file}': has no group '/{group}'; " + (
             "run `gush respond` first" if group.startswith("structure") else "it is not a run file, or it is damaged"
         )
-    return f"run file '{file}': damaged ({type(error).__name__}: {error}); copy it again or repeat the run"
+    return f"run file '{file}': damaged ({type(error).__name__}: {said}); copy it again or repeat the run"

@@ -77,12 +77,18 @@ def write_json(path, data):
         path.write_text(text, encoding="utf-8")
 
 
+def plain(text):
+    """A text without characters that steer a terminal: names in it may come from a file of unknown origin."""
+    return "".join(c if c.isprintable() or c in "\n\t" else f"\\x{ord(c):02x}" for c in str(text))
+
+
 def complain(message, code):
     """Print a message to standard error and leave with an exit code."""
-    Console(stderr=True).print(message, style="red", markup=False, highlight=False, soft_wrap=True)
+    Console(stderr=True).print(plain(message), style="red", markup=False, highlight=False, soft_wrap=True)
     raise typer.Exit(code)
 
 
 def warn(message):
     """Print a warning to standard error."""
-    Console(stderr=True).print(message, style="yellow", markup=False, highlight=False, soft_wrap=True)
+    text = plain(f"warning: {message}")
+    Console(stderr=True).print(text, style="yellow", markup=False, highlight=False, soft_wrap=True)

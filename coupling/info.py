@@ -5,6 +5,7 @@ import tomllib
 from pathlib import Path
 
 from coupling.datasets import RunFileError
+from coupling.own_content import require_own_content
 from coupling.run_folder import RUN_FILE, RunRefused
 
 SIGNATURES = {b"\x89HDF\r\n\x1a\n": "netcdf", b"\x89PNG\r\n\x1a\n": "png", b"GIF8": "gif", b"CDF": "netcdf3"}
@@ -72,6 +73,7 @@ def _netcdf(path):
     import h5netcdf
 
     try:
+        require_own_content(path)
         with h5netcdf.File(path, "r") as content:
             groups, title = list(content.groups), str(content.attrs.get("title", ""))
             names = list(content.variables)

@@ -1,6 +1,5 @@
 """Where pressures and a ring come from: a run, or any netCDF-4 file whose root follows the schema of the pressures."""
 
-import tomllib
 from pathlib import Path
 from typing import NamedTuple
 
@@ -44,7 +43,7 @@ def read_source(path, scene=None):
     coupling.scene.SceneError
         No such scene.
     """
-    from coupling.scene import load_scene, make_scene
+    from coupling.scene import load_scene, parse_scene
     from structure.lining import check_pressures
 
     file = run_file(path)
@@ -55,7 +54,7 @@ def read_source(path, scene=None):
     if scene is not None:
         chosen = load_scene(scene)
     elif "scene" in root.attrs:
-        chosen = make_scene(tomllib.loads(root.attrs["scene"]), str(file))
+        chosen = parse_scene(root.attrs["scene"], str(file))
     if "tunnel" in pressures.dims:
         gate = chosen.mpm.gate if chosen is not None else None
         pressures = pressures.isel(tunnel=gate.tunnel if gate else 0, drop=True)

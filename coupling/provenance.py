@@ -18,18 +18,32 @@ def root_attributes(scene):
     return {
         "Conventions": "CF-1.11",
         "title": f"water and soil gushing into a tunnel: {scene.name}",
-        "source": f"gushing {_version('gushing')}",
-        "revision": revision(),
-        "versions": ", ".join(f"{name} {_version(name)}" for name in PACKAGES),
+        **origin(),
         "solver_sha256": solver_sha256(),
         "python": platform.python_version(),
         "processor": _processor(),
         "random_numbers": "none: neither mesh nor simulation draws any",
+        "history": with_history("", "simulation begun"),
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "scene_name": scene.name,
         "scene": text,
         "scene_sha256": hashlib.sha256(text.encode()).hexdigest(),
     }
+
+
+def origin():
+    """What computes here: attributes source, revision and versions."""
+    return {
+        "source": f"gushing {_version('gushing')}",
+        "revision": revision(),
+        "versions": ", ".join(f"{name} {_version(name)}" for name in PACKAGES),
+    }
+
+
+def with_history(history, event):
+    """The CF attribute `history` with one more line: when, by which version, what."""
+    line = f"{datetime.now(UTC).isoformat(timespec='seconds')} gushing {_version('gushing')}: {event}"
+    return "\n".join(filter(None, (history, line)))
 
 
 def solver_sha256():

@@ -12,7 +12,7 @@ import numpy as np
 from coupling.checkpoint import remove_checkpoints, write_checkpoint
 from coupling.datasets import RunWriter, read_history, write_attributes
 from coupling.journal import replace_file
-from coupling.provenance import root_attributes
+from coupling.provenance import root_attributes, with_history
 from coupling.quality import quality, quality_attributes, quality_line
 from coupling.run_folder import MESH_FILE, RUN_FILE, SCENE_FILE, RunRefused
 from coupling.stop_signals import stop_signals
@@ -116,8 +116,9 @@ class RecordedSimulation:
                 *filter(None, [remains.attributes.get("resumed")]),
                 datetime.now(UTC).isoformat(timespec="seconds"),
             ]
+            history = with_history(remains.attributes.get("history", ""), f"resumed after {kept['records']} records")
             self.writer = RunWriter.continued(
-                path, scene.mpm, kept["records"], kept["snapshots"], resumed=", ".join(resumed)
+                path, scene.mpm, kept["records"], kept["snapshots"], resumed=", ".join(resumed), history=history
             )
         if about is None:
             remove_checkpoints(self.folder)

@@ -1,14 +1,12 @@
 """A run repeated from what its file says, and compared bit for bit with it."""
 
-import tomllib
-
 import numpy as np
 
 from coupling.datasets import raw_groups, read_attributes, run_file
 from coupling.provenance import DECISIVE, differences, root_attributes
 from coupling.run import run
 from coupling.run_folder import RunRefused, default_folder
-from coupling.scene import make_scene
+from coupling.scene import parse_scene
 
 #: Measured by the clock, not computed.
 NOT_COMPARED = {"cpu_seconds"}
@@ -39,7 +37,7 @@ def rerun(first, out=None, progress=None, threads=None, warn=lambda message: Non
     attributes = read_attributes(file)
     if not len(raw_groups(file, ("history",))["history"]["time"]):
         raise RunRefused(f"run '{first}': must hold a record to compare with, it has none; repeat it with gush run")
-    scene = make_scene(tomllib.loads(attributes["scene"]), str(file))
+    scene = parse_scene(attributes["scene"], str(file))
     changed = differences(attributes, root_attributes(scene), (*DECISIVE, "gmsh", "processor"))
     for name, (before, now) in changed.items():
         warn(f"{name}: {before} then, {now} now; results may differ")

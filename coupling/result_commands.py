@@ -7,7 +7,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from coupling.exit_codes import JsonPath, checked_json, failures, write_json
+from coupling.exit_codes import JsonPath, checked_json, failures, plain, write_json
 
 Run = Annotated[Path, typer.Argument(help="Folder (or run.nc) of a run, also one that goes on.")]
 
@@ -62,15 +62,15 @@ def info_command(
         write_json(json_path, data)
         if str(json_path) != "-":
             console, table = Console(), Table("what", "")
-            console.print(f"{data['path']}: {data['kind']}", highlight=False, soft_wrap=True, markup=False)
+            console.print(plain(f"{data['path']}: {data['kind']}"), highlight=False, soft_wrap=True, markup=False)
             if "bytes" in data:
                 size = data["bytes"]
                 table.add_row("size", f"{size} bytes" if size < 1e5 else f"{size / 1e6:.3g} MB")
             for name, value in data["facts"].items():
-                shown = f"{value:.4g}" if isinstance(value, float) else str(value)
+                shown = f"{value:.4g}" if isinstance(value, float) else plain(value)
                 table.add_row(name.replace("[", "\\["), shown.replace("[", "\\["))
             for command in data["next"]:
-                table.add_row("next", command)
+                table.add_row("next", plain(command).replace("[", "\\["))
             console.print(table)
 
 

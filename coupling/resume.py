@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import tomllib
 from dataclasses import dataclass
 
 from coupling.checkpoint import last_checkpoint
@@ -10,7 +9,7 @@ from coupling.datasets import RunFileError, raw_groups, read_attributes
 from coupling.journal import recover
 from coupling.provenance import differences, root_attributes
 from coupling.run_folder import RUN_FILE, SCENE_FILE, RunRefused
-from coupling.scene import make_scene
+from coupling.scene import SceneError, parse_scene
 
 
 @dataclass(frozen=True)
@@ -83,12 +82,14 @@ def _stored_scene(folder, attributes):
     if text is None:
         raise RunRefused(f"run '{folder}': its scene must be readable, {SCENE_FILE} is missing; start a new run")
     try:
-        scene = make_scene(tomllib.loads(text), str(path))
-    except tomllib.TOMLDecodeError as error:
-        raise RunRefused(f"scene '{path}': must be valid TOML, got: {error}; start a new run") from None
+        scene = parse_scene(text, str(path))
+    except SceneError as error:
+        raise RunRefused(
+            f"{error}\nthe scene that the run in '{folder}' began with is damaged; start a new run"
+        ) from None
     if written is not None and written != text:
         try:
-            changed = make_scene(tomllib.loads(written), str(path))
+            changed = parse_scene(written, str(path))
         except ValueError:
             changed = None
         if changed != scene:

@@ -5,6 +5,7 @@ import logging
 
 from coupling.checkpoint import remove_checkpoints
 from coupling.datasets import read_pressures, write_response
+from coupling.plausibility import warnings_of
 from coupling.recorded_simulation import RecordedSimulation, write_quality
 from coupling.resume import find_remains
 from coupling.run_folder import FIGURES, LOG_FILE, RUN_FILE, RunRefused, claimed, default_folder, reopened
@@ -41,7 +42,7 @@ def run(
     checkpoint_interval : float
         Wall time between checkpoints [s].
     warn : callable or None
-        Called with what a user should know and the log says too: damaged files, another processor.
+        Called with what a user should know and the log says too: unusual numbers, damaged files, another processor.
 
     Returns
     -------
@@ -74,6 +75,9 @@ def run(
         if remains is not None:
             scene = remains.scene
             check_memory(scene.mpm)
+        else:
+            for warning in warnings_of(scene):
+                _teller(warn)(warning)
         if remains is not None and remains.finished:
             remove_checkpoints(folder)
         else:

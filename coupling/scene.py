@@ -8,20 +8,26 @@ tunnel with the gate, ``[ring.ground]`` from the soil at that tunnel's axis (see
 import difflib
 import json
 import math
+import reprlib
 import tomllib
 from functools import cached_property
 from importlib import resources
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
+from coupling.plausibility import hints, shown
+from coupling.scene_lines import holds, line_of, path_of
 from mpm.scene import Scene as MpmScene
 from structure.ring import Ring
 
 # No scene is longer; a larger file is something else.
 MOST_BYTES = 1_000_000
+# The deepest key of a scene is ring.ground.law; what is much deeper is no scene and would overflow the stack.
+MOST_LEVELS = 12
+CHANGES = "changes in Python"
 # Keys of [ring] and [ring.ground] that follow from the ground when left out.
 DERIVED = (
     "outer_diameter",
@@ -37,6 +43,17 @@ DERIVED = (
 
 class SceneError(ValueError):
     """A scene that can not be run: rule, name, value, remedy, one line a mistake."""
+
+
+class Layer(NamedTuple):
+    """A TOML text that a scene was read from, the scene's own file before its bases.
+
+    name : str;  text : str;  data : dict, its nested dictionary.
+    """
+
+    name: str
+    text: str
+    data: dict[str, Any]
 
 
 class Scene(BaseModel):
@@ -108,7 +125,11 @@ def load_scene(name: str | Path, **changes: Any) -> Scene:
     SceneError
         Unknown name, unreadable file, or invalid values; every mistake found is named.
     """
-    return make_scene(_merge(read_scene_data(name), changes), str(name))
+    layers = _read(str(name), ())
+    _check_levels(changes, f"changes of scene {str(name)!r}")
+    data = _merge(_merged(layers), changes)
+    # changes come from no file: a layer without a text keeps the lines of the files from being blamed
+    return make_scene(data, str(name), (Layer(CHANGES, "", changes), *layers) if changes else layers)
 
 
 def read_scene_data(name: str | Path) -> dict[str, Any]:
@@ -119,10 +140,22 @@ def read_scene_data(name: str | Path) -> dict[str, Any]:
     SceneError
         Unknown name or unreadable file.
     """
-    return _read(str(name), ())
+    return _merged(_read(str(name), ()))
 
 
-def make_scene(data: dict[str, Any], origin: str = "scene") -> Scene:
+def parse_scene(text: str, origin: str) -> Scene:
+    """A scene from the complete TOML text that a run stores.
+
+    Raises
+    ------
+    SceneError
+        As :func:`load_scene`.
+    """
+    layer = Layer(origin, text, parse_toml(text, f"scene {origin!r}"))
+    return make_scene(layer.data, origin, (layer,))
+
+
+def make_scene(data: dict[str, Any], origin: str = "scene", layers: tuple[Layer, ...] = ()) -> Scene:
     """Validate a nested dictionary with the keys of the TOML file.
 
     Parameters
@@ -131,36 +164,48 @@ def make_scene(data: dict[str, Any], origin: str = "scene") -> Scene:
         Tables ``box``, ``water``, ``soils`` .. of `mpm.Scene`, and ``ring`` of `structure.Ring`.
     origin : str
         What the message of an error starts with.
+    layers : tuple of Layer
+        Texts that the data come from, for the line numbers of mistakes.
 
     Raises
     ------
     SceneError
         Naming every mistake.
     """
-    data = dict(data)
+    if not isinstance(data, dict):
+        raise SceneError(
+            f"scene {origin!r}: must be a dictionary of tables, got a {type(data).__name__}; "
+            "give the nested dictionary of its TOML file"
+        )
+    _check_levels(data, f"scene {origin!r}")
+    whole, data = data, dict(data)
     ring_data = data.pop("ring", None)
-    problems: list[str] = []
+    problems = _truth_values(data, MpmScene, ())
+    if isinstance(ring_data, dict):
+        problems += _truth_values(ring_data, Ring, ("ring",))
     mpm_scene = ring = None
     try:
         mpm_scene = MpmScene.model_validate(data)
     except ValidationError as error:
-        problems += _messages(error, MpmScene, "", extra_names=("ring", "base"))
+        problems += _messages(error, MpmScene, (), extra_names=("ring", "base"))
     if ring_data is not None:
         if not isinstance(ring_data, dict):
-            problems.append(f"ring: must be a table, got {ring_data!r}; write [ring] with its keys below")
+            problems.append((("ring",), f"must be a table, got {_short(ring_data)}; write [ring] with its keys below"))
         else:
             derived = {} if mpm_scene is None else derived_ring(mpm_scene)
             try:
                 ring = Ring.model_validate(_merge(derived, ring_data))
             except ValidationError as error:
                 # Without a valid ground there is nothing to derive the missing keys from.
-                problems += _messages(error, Ring, "ring", silent=() if derived else DERIVED)
+                problems += _messages(error, Ring, ("ring",), silent=() if derived else DERIVED)
     if not problems and mpm_scene is not None:
         try:
             return Scene(mpm=mpm_scene, ring=ring)
         except ValidationError as error:
-            problems += _messages(error, Scene, "")
-    lines = [f"scene {origin!r} has {len(problems)} mistake{'s' * (len(problems) > 1)}:", *problems]
+            problems += _messages(error, Scene, ())
+    unusual = hints(whole)
+    lines = [f"scene {origin!r} has {len(problems)} mistake{'s' * (len(problems) > 1)}:"]
+    lines += [_line(location, message, whole, origin, layers, unusual) for location, message in problems]
     raise SceneError("\n  ".join(lines))
 
 
@@ -204,52 +249,109 @@ def ground_at_axis(scene: MpmScene, depth: float) -> dict[str, float]:
     }
 
 
-def _read(name: str, chain: tuple[str, ...]) -> dict[str, Any]:
-    """The nested dictionary of a scene with its bases merged; `chain` holds the scenes that led here."""
+def _read(name: str, chain: tuple[str, ...]) -> tuple[Layer, ...]:
+    """The texts that make up a scene, its own first; `chain` holds the scenes that led here."""
     if name in chain:
-        raise SceneError(f"scene {name!r}: base must not lead back to itself, got {' -> '.join([*chain, name])}")
+        raise SceneError(
+            f"scene {name!r}: base must not lead back to itself, got {' -> '.join([*chain, name])}; name another base"
+        )
+    if len(chain) > MOST_LEVELS:
+        raise SceneError(f"scene {name!r}: at most {MOST_LEVELS} bases may follow each other; merge some of the files")
     if name in scene_names():
         text = (resources.files("coupling") / "scenes" / f"{name}.toml").read_text(encoding="utf-8")
     else:
         text = _read_file(name)
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"scene {name!r}: must be valid TOML, got: {error}; is the file truncated?") from None
+    data = parse_toml(text, f"scene {name!r}")
     if not data:
         raise SceneError(f"scene {name!r}: must describe a scene, got an empty file; start from base = 'case-3'")
     base = data.pop("base", None)
+    layer = Layer(name, text, data)
     if base is None:
-        return data
+        return (layer,)
     if not isinstance(base, str):
         raise SceneError(
-            f"scene {name!r}: base must be the name or file of a scene, got {base!r}; write base = 'case-3'"
+            f"scene {name!r}: base must be the name or file of a scene, got {_short(base)}; write base = 'case-3'"
         )
     # A file's base is looked up beside it, wherever the program was started.
     beside = Path(name).parent / base
-    return _merge(_read(base if base in scene_names() or not beside.exists() else str(beside), (*chain, name)), data)
+    return (layer, *_read(base if base in scene_names() or not _is_there(beside) else str(beside), (*chain, name)))
+
+
+def _merged(layers: tuple[Layer, ...]) -> dict[str, Any]:
+    data: dict[str, Any] = {}
+    for layer in reversed(layers):
+        data = _merge(data, layer.data)
+    return data
+
+
+def parse_toml(text: str, who: str) -> dict[str, Any]:
+    """Nested dictionary of a TOML text.
+
+    Raises
+    ------
+    SceneError
+        Not valid TOML, with the line, or nested more deeply than any scene.
+    """
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"{who}: must be valid TOML, got: {error}; is the file truncated?") from None
+    except RecursionError:
+        raise SceneError(f"{who}: must not nest brackets hundreds deep; this is no scene file") from None
+    except ValueError as error:
+        raise SceneError(f"{who}: must hold numbers of ordinary length, got: {error}; shorten them") from None
+    _check_levels(data, who)
+    return data
+
+
+def _check_levels(data: Any, who: str) -> None:
+    entries = [data]
+    for _ in range(MOST_LEVELS):
+        inner = (each.values() if isinstance(each, dict) else each for each in entries)
+        entries = [entry for each in inner for entry in each if isinstance(entry, dict | list | tuple)]
+        if not entries:
+            return
+    raise SceneError(f"{who}: must not nest tables and lists more than {MOST_LEVELS} deep; this is no scene")
+
+
+def _is_there(path: Path) -> bool:
+    try:
+        return path.exists()
+    except (OSError, ValueError):  # too long a name, a zero in it
+        return False
 
 
 def _read_file(name: str) -> str:
     path = Path(name)
-    if not path.exists():
+    if not _is_there(path):
         near = difflib.get_close_matches(name, scene_names(), 1)
         hint = f"did you mean {near[0]!r}? " if near else ""
         raise SceneError(
-            f"scene {name!r}: must be a built-in scene or a file, got neither; {hint}"
+            f"scene {_short(name)}: must be a built-in scene or a file, got neither; {hint}"
             f"built-in: {', '.join(scene_names())}"
         )
+    return read_toml_file(path, f"scene {name!r}")
+
+
+def read_toml_file(path: Path, who: str) -> str:
+    """Text of a file that is meant to be TOML.
+
+    Raises
+    ------
+    SceneError
+        No regular file (a device or a pipe may never end), longer than 1 MB, unreadable, or no text.
+    """
     try:
+        if not path.is_file():
+            raise SceneError(f"{who}: must be a readable file, got a folder or device; give the TOML file itself")
         size = path.stat().st_size
         if size > MOST_BYTES:
-            raise SceneError(f"scene {name!r}: must be shorter than 1 MB, got {size} bytes; this is no scene file")
+            raise SceneError(f"{who}: must be shorter than 1 MB, got {size} bytes; this is no scene file")
         return path.read_text(encoding="utf-8")
     except OSError as error:
-        raise SceneError(
-            f"scene {name!r}: must be a readable file, got: {error.strerror}; check path and rights"
-        ) from None
+        raise SceneError(f"{who}: must be a readable file, got: {error.strerror}; check path and rights") from None
     except UnicodeDecodeError as error:
-        raise SceneError(f"scene {name!r}: must be UTF-8 text, got: {error}; this is no scene file") from None
+        raise SceneError(f"{who}: must be UTF-8 text, got: {error}; this is no scene file") from None
 
 
 #: Tables that a scene may leave out although its base has them: `water = "none"` makes it dry.
@@ -268,18 +370,78 @@ def _merge(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     return merged
 
 
+def _short(value: Any) -> str:
+    """A value as a message shows it, never long."""
+    shortened = reprlib.Repr()
+    shortened.maxstring = shortened.maxother = shortened.maxlong = 60
+    return shortened.repr(value)
+
+
+def _line(
+    location: tuple[Any, ...],
+    message: str,
+    data: dict[str, Any],
+    origin: str,
+    layers: tuple[Layer, ...],
+    unusual: dict[tuple[Any, ...], str],
+) -> str:
+    """One line for a mistake: the line of the file, where, the message, and a likely wrong unit."""
+    path = path_of(message, location, data)
+    text = f"{shown(location)}: {message}" if location else message
+    for other, hint in unusual.items():
+        # the number itself, or one beside it that the message does not blame
+        if other == path or (other[:-1] == path[:-1] and path not in unusual):
+            text += f"; {shown(other)} {hint}"
+    layer, kept = _source(path, layers)
+    number = line_of(layer.text, path[:kept]) if kept and layer.text else None
+    if number is None:
+        return text
+    return f"line {number}: {text}" if layer.name == origin else f"{layer.name} line {number}: {text}"
+
+
+def _source(path: tuple[Any, ...], layers: tuple[Layer, ...]) -> tuple[Layer | None, int]:
+    """The text that says most of a path, and how many of its parts: of a missing key only its table stands there."""
+    best, most = None, 0
+    list_at = next((k for k, part in enumerate(path) if isinstance(part, int)), None)
+    for layer in layers:
+        kept = next((k for k in range(len(path), 0, -1) if holds(layer.data, path[:k])), 0)
+        if kept > most:
+            best, most = layer, kept
+        if list_at is not None and kept >= list_at:
+            break  # a list replaces that of a base as a whole
+    return best, most
+
+
+def _truth_values(data: Any, model: type[BaseModel], location: tuple[Any, ...]) -> list[tuple[tuple[Any, ...], str]]:
+    """Where a number or text is asked for and a truth value is given, which pydantic would take for 0 or 1."""
+    found = []
+    for key, value in data.items() if isinstance(data, dict) else ():
+        field, where = model.model_fields.get(key) if isinstance(key, str) else None, (*location, key)
+        if field is None:
+            continue
+        inner = next(_models_in(field.annotation), None)
+        entries = enumerate(value) if isinstance(value, list | tuple) else [(None, value)]
+        for index, entry in entries:
+            at = where if index is None else (*where, index)
+            if isinstance(entry, bool) and field.annotation is not bool:
+                found.append((at, f"must not be a truth value, got {str(entry).lower()}; give the number or name"))
+            elif inner is not None:
+                found += _truth_values(entry, inner, at)
+    return found
+
+
 def _messages(
     error: ValidationError,
     model: type[BaseModel],
-    prefix: str,
+    prefix: tuple[Any, ...],
     *,
     silent: tuple[str, ...] = (),
     extra_names: tuple[str, ...] = (),
-) -> list[str]:
-    """One line a mistake: where, rule, value, remedy."""
-    lines = []
+) -> list[tuple[tuple[Any, ...], str]]:
+    """Location and message of every mistake: rule, value, remedy."""
+    found = []
     missing: dict[tuple[Any, ...], list[str]] = {}
-    for item in error.errors():
+    for item in error.errors(include_url=False):
         if item["type"] == "missing":
             if item["loc"][-1] not in silent:
                 missing.setdefault(item["loc"][:-1], []).append(str(item["loc"][-1]))
@@ -287,26 +449,16 @@ def _messages(
         if item["type"] == "too_short" and item["input"]:
             # Only the echo of the mistakes inside its entries.
             continue
-        where = _where(item["loc"], prefix)
-        lines.append(f"{where}: {_message(item, model, extra_names)}" if where else _message(item, model, extra_names))
+        found.append(((*prefix, *item["loc"]), _message(item, model, extra_names)))
     for table, names in missing.items():
-        where = _where(table, prefix)
         # A soil is where newcomers change one number and lose the others.
         whole = (
             f"; [[{table[0]}]] replaces all {table[0]} of the base, so copy all keys of it" if len(table) > 1 else ""
         )
         them = "it decides the answer and has" if len(names) == 1 else "they decide the answer and have"
-        lines.append(
-            f"{where}{': ' if where else ''}{', '.join(names)} missing; {them} no default, see the built-in case-3 for"
-            f" an example{whole}"
-        )
-    return lines
-
-
-def _where(location: tuple[Any, ...], prefix: str) -> str:
-    for part in location:
-        prefix += f"[{part}]" if isinstance(part, int) else f"{'.' * bool(prefix)}{part}"
-    return prefix
+        text = f"{', '.join(names)} missing; {them} no default, see the built-in case-3 for an example{whole}"
+        found.append(((*prefix, *table), text))
+    return found
 
 
 def _message(item: Any, model: type[BaseModel], extra_names: tuple[str, ...]) -> str:
@@ -314,21 +466,32 @@ def _message(item: Any, model: type[BaseModel], extra_names: tuple[str, ...]) ->
     if kind == "extra_forbidden":
         here = [*_names_at(model, item["loc"][:-1]), *(extra_names if len(item["loc"]) == 1 else ())]
         near = difflib.get_close_matches(str(item["loc"][-1]), here, 1)
-        return f"unknown key, got {value!r}; " + (f"did you mean {near[0]!r}?" if near else f"known: {', '.join(here)}")
+        return f"unknown key, got {_short(value)}; " + (
+            f"did you mean {near[0]!r}?" if near else f"known: {', '.join(here)}"
+        )
     message = item["msg"].removeprefix("Value error, ")
     if kind == "value_error":
         return message
     rule = message.replace("Input should", "must", 1)
     if kind in ("model_type", "dict_type"):
         rule = "must be a table"
-    shown = repr(value) if isinstance(value, str | int | float) else f"a {type(value).__name__}"
     limits = item.get("ctx", {})
+    given = _short(value) if isinstance(value, str | int | float) else f"a {type(value).__name__}"
     if kind == "too_short":
-        return f"must have at least {limits['min_length']} entry, got {value!r}; add one"
+        return f"must have at least {limits['min_length']} entry, got {_short(value)}; add one"
+    if kind == "too_long":
+        return f"must have at most {limits['max_length']} entries, got {len(value)}; merge or leave out some"
+    if kind == "string_pattern_mismatch":
+        return f"must be letters, digits and the like, beginning with a letter or digit, got {given}; rename it"
+    if kind == "literal_error" and isinstance(value, str):
+        near = difflib.get_close_matches(value.lower(), limits["expected"].replace("'", "").split(" or "), 1)
+        return f"{rule}, got {given}; " + (f"did you mean {near[0]!r}?" if near else "choose one of these")
     remedy = next(
         (f"give a value {sign} {limits[key]:g}" for key, sign in _LIMITS.items() if key in limits), "correct it"
     )
-    return f"{rule}, got {shown}; {remedy}"
+    if kind == "float_parsing":
+        remedy = "give a plain number"
+    return f"{rule}, got {given}; {remedy}"
 
 
 _LIMITS = {"gt": "above", "ge": "from", "lt": "below", "le": "up to"}

@@ -7,11 +7,24 @@ middle of the box. Numbers that decide the answer have no default; numerical one
 
 import math
 import os
+import re
 from functools import cache, cached_property
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator, model_validator
+
+#: A number and a unit: letters with a one-digit exponent at most, joined by *, / or a space. Nothing is evaluated: left
+#: to itself pint would compute "9**9**9**9 m".
+_UNIT = r"(?:[^\W\d_]|[°%])+(?:(?:\*\*|\^)?-?[0-9])?"
+_QUANTITY = re.compile(
+    rf"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*"
+    rf"((?:1?\s*/\s*)?{_UNIT}(?:\s*[*/·]\s*{_UNIT}|\s+{_UNIT})*)\s*"
+)
+MOST_RECORDS = 1_000_000
+_HOUR = 3600.0
+#: Smallest (outer - inner) / outer diameter: the channel through a thinner lining has no length to mesh.
+MOST_SLENDER = 0.01
 
 
 @cache
@@ -27,13 +40,16 @@ def in_unit(unit: str) -> BeforeValidator:
     def convert(value: Any) -> Any:
         if not isinstance(value, str):
             return value
-        try:
-            registry = _unit_registry()
-            return registry.Quantity(value.replace("m3", "m**3").replace("m2", "m**2")).to(unit).magnitude
-        except Exception as error:
-            raise ValueError(
-                f"must be a quantity in {unit}, got {value!r}: {error}; write it like '20 {unit}'"
-            ) from None
+        given, why = value if len(value) <= 40 else f"{value[:40]}..", ""
+        parts = _QUANTITY.fullmatch(value) if len(value) <= 60 else None
+        if parts is not None:
+            text = re.sub(r"(?:\*\*|\^)?(-?[0-9])", r"**\1", parts[2].replace("·", "*").removeprefix("1").lstrip())
+            try:
+                quantity = _unit_registry().Quantity(float(parts[1]), f"1{text}" if text.startswith("/") else text)
+                return quantity.to(unit).magnitude
+            except Exception as error:
+                why = f": {error}"
+        raise ValueError(f"must be a quantity in {unit}, got {given!r}{why}; write it like '20 {unit}'")
 
     return BeforeValidator(convert)
 
@@ -59,7 +75,7 @@ class Box(Part):
 
     width: Length = Field(gt=0, le=2000)
     depth: Length = Field(gt=0, le=2000)
-    headroom: Length | None = Field(default=None, gt=0)
+    headroom: Length | None = Field(default=None, gt=0, le=2000)
 
 
 class Water(Part):
@@ -73,7 +89,7 @@ class Water(Part):
 class Soil(Part):
     """One soil layer, from `top_depth` down to the next layer or the bottom."""
 
-    name: str
+    name: str = Field(max_length=60, pattern=r"^\w[\w .,()+-]*$")  # it is shown in tables, pages and pictures
     top_depth: Length = Field(ge=0)
     model: Literal["mohr-coulomb", "elastic"]
     youngs_modulus: Pressure = Field(ge=1e4, le=1e11)
@@ -81,7 +97,7 @@ class Soil(Part):
     cohesion: Pressure = Field(ge=0, le=1e8)
     friction_angle: Angle = Field(ge=0, lt=60)
     dilatancy_angle: Angle = Field(ge=0, lt=60)
-    tensile_strength: Pressure = Field(default=0.0, ge=0)
+    tensile_strength: Pressure = Field(default=0.0, ge=0, le=1e8)
     porosity: float
     loose_porosity: float
     grain_density: Density = Field(gt=1000, lt=10000)
@@ -113,7 +129,7 @@ class Soil(Part):
         if not self.porosity < self.loose_porosity <= 0.9:
             raise ValueError(
                 f"{who}: loose_porosity (above it grains do not touch) must lie between porosity "
-                f"{self.porosity:g} and 0.9, got {self.loose_porosity:g}"
+                f"{self.porosity:g} and 0.9, got {self.loose_porosity:g}; raise it"
             )
         if self.dilatancy_angle > self.friction_angle:
             raise ValueError(
@@ -121,7 +137,9 @@ class Soil(Part):
                 f"{self.friction_angle:g} deg; the flow rule would create energy"
             )
         if self.model == "mohr-coulomb" and self.friction_angle == 0 and self.cohesion == 0:
-            raise ValueError(f"{who}: friction_angle and cohesion are both 0: no strength at all; give one of them")
+            raise ValueError(
+                f"{who}: friction_angle and cohesion must not both be 0, no strength at all; give one of them"
+            )
         return self
 
 
@@ -152,7 +170,7 @@ class Tunnel(Part):
 
     x: Length
     cover: Length = Field(gt=0)
-    outer_diameter: Length = Field(gt=0)
+    outer_diameter: Length = Field(ge=0.1)
     inner_diameter: Length = Field(gt=0)
     friction_coefficient: float = Field(ge=0, le=2)
     lining: Lining | None = None
@@ -166,7 +184,12 @@ class Tunnel(Part):
         if self.inner_diameter >= self.outer_diameter:
             raise ValueError(
                 f"tunnel: inner_diameter {self.inner_diameter:g} m must be smaller than outer_diameter "
-                f"{self.outer_diameter:g} m"
+                f"{self.outer_diameter:g} m; swap them if they were exchanged"
+            )
+        if self.outer_diameter - self.inner_diameter < MOST_SLENDER * self.outer_diameter:
+            raise ValueError(
+                f"tunnel: inner_diameter {self.inner_diameter:g} m must leave a lining of at least "
+                f"{100 * MOST_SLENDER / 2:g} % of outer_diameter {self.outer_diameter:g} m; give the inner face"
             )
         return self
 
@@ -191,20 +214,20 @@ class Gate(Part):
 
     tunnel: int = Field(default=0, ge=0)
     angle: Angle = Field(ge=0, lt=360)
-    width: Length = Field(gt=0)
+    width: Length = Field(ge=1e-3)  # through less no grain of sand goes
 
 
 class Discretisation(Part):
     """Mesh sizes [m] and points per element; the size grows by `size_growth` per metre away from a feature."""
 
-    element_size: Length = Field(gt=0)
-    element_size_lining: Length = Field(gt=0)
-    element_size_interior: Length = Field(gt=0)
+    element_size: Length = Field(ge=1e-3, le=2000)
+    element_size_lining: Length = Field(ge=1e-3, le=2000)
+    element_size_interior: Length = Field(ge=1e-3, le=2000)
     elements_across_gate: int = Field(default=4, ge=2, le=40)
     gate_radius: Length = Field(gt=0)
-    size_growth: float = Field(default=0.12, gt=0, le=1)
-    points_per_element: int = 3
-    points_per_element_gate: int = 12
+    size_growth: float = Field(default=0.12, ge=0.01, le=1)
+    points_per_element: int = Field(default=3, le=400)
+    points_per_element_gate: int = Field(default=12, le=400)
 
     @model_validator(mode="after")
     def _check(self):
@@ -243,14 +266,14 @@ class Numerics(Part):
     critical_step: Literal["altitude", "spectral"] = "spectral"
     local_time_stepping: bool = True
     relaxation_tolerance: float = Field(default=1e-5, gt=0, lt=1)
-    max_relaxation_steps: int = Field(default=20000, ge=1)
+    max_relaxation_steps: int = Field(default=20000, ge=1, le=10_000_000)
 
 
 class Stop(Part):
     """Where a run ends: at a time [s], at an inflow mass [kg/m], or whichever comes first."""
 
-    time: Time | None = Field(default=None, gt=0)
-    inflow_mass: Mass | None = Field(default=None, gt=0)
+    time: Time | None = Field(default=None, gt=0, le=1e7)
+    inflow_mass: Mass | None = Field(default=None, gt=0, le=1e9)
 
     @model_validator(mode="after")
     def _check(self):
@@ -269,7 +292,7 @@ class Output(Part):
         whatever the interval says; pressures and history are all that is wanted.
     """
 
-    interval: Time = Field(gt=0)
+    interval: Time = Field(gt=0, le=1e7)
     snapshot_interval: Time | None = Field(default=None, gt=0)
     points: bool = True
 
@@ -284,12 +307,12 @@ class Scene(Part):
         where `asymmetry` finds nothing that forbids it. The rest are the tables of a scene file.
     """
 
-    name: str = Field(min_length=1, max_length=80, pattern=r"^[\w.-]+$")
+    name: str = Field(min_length=1, max_length=80, pattern=r"^\w[\w.-]*$")  # a folder's name
     gravity: Acceleration = Field(default=9.81, ge=0, le=100)
     box: Box
     water: Water | None = None
-    soils: tuple[Soil, ...] = Field(min_length=1)
-    tunnels: tuple[Tunnel, ...] = ()
+    soils: tuple[Soil, ...] = Field(min_length=1, max_length=100)
+    tunnels: tuple[Tunnel, ...] = Field(default=(), max_length=16)
     gate: Gate | None = None
     lining: Lining = "fixed"
     initial_contact: Literal["bonded", "frictional"] = "bonded"
@@ -304,9 +327,12 @@ class Scene(Part):
     def _check(self):
         tops = [soil.top_depth for soil in self.soils]
         if tops[0] != 0 or any(b <= a for a, b in pairwise(tops)):
-            raise ValueError(f"soils: top_depth must start at 0 and increase, got {tops}")
+            raise ValueError(f"soils: top_depth must start at 0 and increase, got {tops}; list the layers downward")
         if tops[-1] >= self.box.depth:
-            raise ValueError(f"soils: top_depth {tops[-1]:g} m lies below the box of depth {self.box.depth:g} m")
+            raise ValueError(
+                f"soils: top_depth {tops[-1]:g} m must lie in the box of depth {self.box.depth:g} m; leave "
+                "the layer out, or deepen the box"
+            )
         if self.water is not None:
             unknown = [soil.name for soil in self.soils if soil.hydraulic_conductivity is None]
             if unknown:
@@ -316,7 +342,8 @@ class Scene(Part):
                 )
         if self.water is not None and self.water.table_depth >= self.box.depth:
             raise ValueError(
-                f"water: table_depth {self.water.table_depth:g} m lies below the box of depth {self.box.depth:g} m"
+                f"water: table_depth {self.water.table_depth:g} m must lie in the box of depth {self.box.depth:g} m; "
+                "leave [water] out for a dry scene"
             )
         size = self.discretisation.element_size
         for k, t in enumerate(self.tunnels):
@@ -339,7 +366,8 @@ class Scene(Part):
         if self.gate is not None:
             if self.gate.tunnel >= len(self.tunnels):
                 raise ValueError(
-                    f"gate: tunnel {self.gate.tunnel} does not exist; there are {len(self.tunnels)}, counted from 0"
+                    f"gate: tunnel {self.gate.tunnel} must be one of the {len(self.tunnels)}, counted from 0; "
+                    "give its number"
                 )
             t = self.tunnels[self.gate.tunnel]
             if self.gate.width > 0.5 * t.inner_radius:
@@ -352,6 +380,14 @@ class Scene(Part):
         if self.symmetry == "half" and self.asymmetry is not None:
             raise ValueError(
                 f"symmetry: 'half' must mirror the scene in x = 0, got {self.asymmetry}; write symmetry = 'auto'"
+            )
+        if self.stop.time is None and self.gravity == 0:
+            raise ValueError("stop: inflow_mass is never reached without gravity, got 0; give stop.time")
+        longest = self.stop.time if self.stop.time is not None else _HOUR
+        if longest / self.output.interval > MOST_RECORDS:
+            raise ValueError(
+                f"output: interval must give at most {MOST_RECORDS:.0e} records in {longest:g} s, got "
+                f"{self.output.interval:g} s; give e.g. {longest / 1000:g}"
             )
         needed, available = self.estimated_bytes, _physical_memory()
         if needed > available:
@@ -409,7 +445,8 @@ class Scene(Part):
         """Rough number of elements that are computed, from the integral of the inverse element area [-]."""
         d = self.discretisation
         area = 0.433  # equilateral triangle of unit edge
-        count = self.box.width * self.box.depth / (area * d.element_size**2)
+        height = self.box.depth + (self.box.headroom or d.element_size)
+        count = self.box.width * height / (area * d.element_size**2)
         for t in self.tunnels:
             count += _graded(2 * math.pi * t.outer_radius, d.element_size_lining, d.element_size, d.size_growth) / area
             if self.gate is not None and self.interior == "resolved":

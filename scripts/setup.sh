@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # What Python packages cannot bring: uv, and the system libraries that the gmsh wheel loads;
-# with --tests also the one of the openseespy wheel, which only a test uses.
+# with --tests also what only tests use: the library of the openseespy wheel, and a browser for the report page.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -41,10 +41,24 @@ need_libraries() {
     install_packages $3
 }
 
+# without one the tests of the page are skipped, so a machine that offers none still runs all others
+need_browser() {
+    local name
+    for name in chromium-headless-shell chromium chromium-browser google-chrome google-chrome-stable; do
+        command -v "$name" >/dev/null && return
+    done
+    if command -v apt-get >/dev/null; then
+        (install_packages chromium-headless-shell) || (install_packages chromium) || true
+    fi
+    command -v chromium-headless-shell >/dev/null || command -v chromium >/dev/null ||
+        echo "no Chromium could be installed: the tests of the report page in a browser are skipped" >&2
+}
+
 if [ "$(uname)" = Linux ]; then
     need_libraries gmsh "$gmsh_libraries" "$gmsh_packages"
     if [ "${1:-}" = --tests ]; then
         need_libraries openseespy libblas.so.3 libblas3
+        need_browser
     fi
 fi
 

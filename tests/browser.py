@@ -13,6 +13,11 @@ from pathlib import Path
 
 NAMES = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 SECONDS = 60.0
+#: What keeps the browser itself from talking to anybody.
+SILENT = (
+    "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--disable-quic", "--disable-domain-reliability", "--no-pings", "--metrics-recording-only",
+)  # fmt: skip
 
 
 def find_browser():
@@ -44,8 +49,8 @@ class Browser:
         self._from, to_write = _pipe()
         arguments = [
             executable, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--hide-scrollbars",
-            "--remote-debugging-pipe", f"--user-data-dir={self._profile}", "--no-first-run",
-            "--disable-background-networking", "--force-color-profile=srgb", "about:blank",
+            "--remote-debugging-pipe", f"--user-data-dir={self._profile}", "--force-color-profile=srgb", *SILENT,
+            "about:blank",
         ]  # fmt: skip
         actions = [(os.POSIX_SPAWN_DUP2, to_read, 3), (os.POSIX_SPAWN_DUP2, to_write, 4),
                    (os.POSIX_SPAWN_OPEN, 2, os.devnull, os.O_WRONLY, 0)]  # fmt: skip

@@ -1,15 +1,13 @@
 """What was computed: the scene in numbers, its section through the ground, and what was left out."""
 
-import tomllib
-
-from coupling.scene import SceneError, make_scene
+from coupling.scene import SceneError, parse_scene
 
 
 def read_scene(attributes):
     """The scene stored with a run; None where this version of the program no longer understands it."""
     try:
-        return make_scene(tomllib.loads(attributes["scene"]), "scene of the run")
-    except (KeyError, tomllib.TOMLDecodeError, SceneError):
+        return parse_scene(attributes["scene"], "scene of the run")
+    except (KeyError, SceneError):
         return None
 
 

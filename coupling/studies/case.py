@@ -38,18 +38,18 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int) 
     mpm.RunFailed, structure.LiningFailure, coupling.run_folder.RunRefused
         As :func:`coupling.run`; the study goes on without the case.
     """
-    import tomllib
 
     from coupling.datasets import read_history, read_pressures, write_response
+    from coupling.provenance import root_attributes
     from coupling.run import respond, run
     from coupling.run_folder import RUN_FILE
-    from coupling.scene import make_scene
+    from coupling.scene import parse_scene
 
     place = Path(folder)
     done = place / CASE_FILE
     if done.is_file():
         return str(done)
-    scene = make_scene(tomllib.loads(source), str(place))
+    scene = parse_scene(source, str(place))
     place.mkdir(parents=True, exist_ok=True)
     run_folder = place / RUN_FOLDER
     run(scene, run_folder, overwrite=True, threads=1)
@@ -62,7 +62,7 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int) 
         write_response(run_folder / RUN_FILE, responses[name], name)
     last = scene.mpm.stop.inflow_mass or float(history["inflow_mass"].values[-1])
     result = at_inflow_masses(pressures, history, responses, np.linspace(0.0, last, records))
-    result.attrs["scene"] = source
+    result.attrs = root_attributes(scene)
     waiting = place / f"{CASE_FILE}.{os.getpid()}"
     result.to_netcdf(waiting, engine="h5netcdf")
     waiting.replace(done)

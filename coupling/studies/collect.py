@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from coupling.provenance import origin, with_history
 from coupling.studies.design import Case, Study
 
 
@@ -18,7 +19,8 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     xarray.Dataset
         Variables of :func:`coupling.studies.case.at_inflow_masses` with `case` in front; parameters as coordinates
         (case) under their dotted names with `_` for `.`; `status` (case) "finished" or "failed", `message` (case);
-        failed cases are NaN. Attributes: `study`, its definition as JSON; `failed`, their number.
+        failed cases are NaN. Attributes: `study`, its definition as JSON with the seed; `failed`, their number; source,
+        revision, versions.
     """
     import xarray as xr
 
@@ -45,8 +47,10 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     result["status"] = ("case", np.where(done, "finished", "failed"))
     result["message"] = ("case", np.array([failures.get(case.key, "") for case in cases], dtype=str))
     result.attrs = {
+        **origin(),
         "Conventions": "CF-1.11",
         "title": f"study {plan.name}",
+        "history": with_history("", "cases collected"),
         "study": json.dumps(plan.model_dump(mode="json")),
         "failed": int((~done).sum()),
     }

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 import itertools
 import math
-import tomllib
+import re
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -15,7 +16,8 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from coupling.scene import Scene, SceneError, make_scene, read_scene_data
+from coupling.scene import Scene, SceneError, make_scene, parse_toml, read_scene_data, read_toml_file
+from coupling.scene_lines import line_of
 
 #: Changes when stored cases can no longer be used.
 FORMAT = "1"
@@ -75,7 +77,7 @@ class Study(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    name: str = Field(min_length=1, max_length=60, pattern=r"^[\w.-]+$")
+    name: str = Field(min_length=1, max_length=60, pattern=r"^\w[\w.-]*$")
     scene: str = "quick"
     design: Literal["factorial", "list", "latin-hypercube", "sobol"] = "factorial"
     parameters: dict[str, tuple[Any, ...] | Range] = Field(min_length=1)
@@ -147,15 +149,28 @@ def load_study(study: str | Path | dict | Study) -> Study:
     if isinstance(study, Study):
         return study
     origin = "study" if isinstance(study, dict) else f"study '{study}'"
-    data = study if isinstance(study, dict) else _read(str(study))
+    text = "" if isinstance(study, dict) else _read(str(study))
+    data = study if isinstance(study, dict) else parse_toml(text, origin)
     try:
         return Study.model_validate(data)
     except ValidationError as error:
         lines = []
         for item in error.errors():
             where = ".".join(str(part) for part in item["loc"] if part not in ("tuple[any, ...]", "Range"))
-            lines.append(f"{where}: {item['msg'].removeprefix('Value error, ')}".removeprefix(": "))
+            message = f"{where}: {item['msg'].removeprefix('Value error, ')}".removeprefix(": ")
+            if item["type"] == "extra_forbidden":
+                near = difflib.get_close_matches(where, Study.model_fields, 1)
+                message += f"; did you mean {near[0]!r}?" if near else f"; known: {', '.join(Study.model_fields)}"
+            number = _line(text, item["loc"] or re.findall(r"\w+", message)[:1])
+            lines.append(f"line {number}: {message}" if number else message)
         raise StudyError("\n  ".join([f"{origin} has {len(lines)} mistake{'s' * (len(lines) > 1)}:", *lines])) from None
+
+
+def _line(text, location):
+    """Line of the study's text that says most of a location, None where none does."""
+    location = tuple(location)
+    found = (line_of(text, location[:k]) for k in range(len(location), 0, -1)) if text else ()
+    return next((number for number in found if number is not None), None)
 
 
 def study_names() -> list[str]:
@@ -223,24 +238,19 @@ def _key(scene: Scene, study: Study) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def _read(name: str) -> dict[str, Any]:
+def _read(name: str) -> str:
     try:
         if name in study_names():
             text = (resources.files("coupling") / "studies" / "ready" / f"{name}.toml").read_text(encoding="utf-8")
+        elif Path(name).exists():
+            text = read_toml_file(Path(name), f"study {name!r}")
         else:
-            text = Path(name).read_text(encoding="utf-8")
+            raise FileNotFoundError
     except FileNotFoundError:
-        import difflib
-
         near = difflib.get_close_matches(name, study_names(), 1)
         hint = f"did you mean {near[0]!r}? " if near else ""
         raise StudyError(
             f"study {name!r}: must be a built-in study or a file, got neither; {hint}built-in:"
             f" {', '.join(study_names())}"
         ) from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise StudyError(f"study {name!r}: must be a readable text file, got: {error}; check path and rights") from None
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise StudyError(f"study {name!r}: must be valid TOML, got: {error}; is the file truncated?") from None
+    return text

@@ -1,0 +1,174 @@
+"""Generated scenes and damaged files: each must give a plan, the right content, or a refusal that says what to do.
+
+    uv run python benchmarks/fuzz.py [scenes | files] [--count N] [--seed 0]
+
+10 000 scenes and 1 000 files when left out. Writes its parts of docs/robustness.md and docs/robustness.json.
+"""
+
+import argparse
+import contextlib
+import random
+import sys
+import tempfile
+import time
+import tomllib
+import traceback
+from collections import Counter
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "benchmarks")]
+COUNTS = {"scenes": 10_000, "files": 1_000}
+PYTHON_EVERY = 4  # every so many scenes also as Python dictionaries
+SIMULATED = 12
+#: Damages by kind of file; a run file takes a second, a scene a millisecond.
+SHARES = {"run.nc": 0.3, "checkpoint.h5": 0.25, "run.nc.journal": 0.15, "scene.toml": 0.2, "study.toml": 0.1}
+STUDY = """name = "angles"
+scene = "quick"
+records = 11
+[parameters]
+"gate.angle" = [45.0, 90.0]
+"soils.0.porosity" = [0.4, 0.45]
+"""
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("what", nargs="?", choices=tuple(COUNTS))
+    parser.add_argument("--count", type=int)
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    from robustness_page import write_part
+
+    faults = 0
+    for what in [options.what] if options.what else COUNTS:
+        count = options.count or COUNTS[what]
+        with tempfile.TemporaryDirectory(prefix="gush-fuzz-") as place:
+            begin = time.monotonic()
+            result = {"scenes": scenes, "files": files}[what](Path(place), count, options.seed)
+        result |= {"count": count, "seed": options.seed, "seconds": time.monotonic() - begin}
+        write_part(what, result)
+        print(what, result["verdicts"], *result["faults"], sep="\n  ")
+        faults += len(result["faults"])
+    sys.exit(bool(faults))
+
+
+def scenes(place, count, seed):
+    """Judge generated scenes; simulate some of those that can be planned."""
+    import wild_scenes
+    from small_event import small_scene
+
+    import coupling
+
+    base, file = small_scene(stop={"time": 0.01}, output={"interval": 0.005}).source, place / "mine.toml"
+    verdicts, faults, slowest, planned = Counter(), [], 0.0, []
+    for number in range(count):
+        text = wild_scenes.wild_text(random.Random(f"{seed} {number}"), base)
+        file.write_bytes(text.encode("utf-8", "surrogatepass"))
+        begin = time.monotonic()
+        try:
+            verdict, said = wild_scenes.judged(lambda: coupling.load_scene(file), "mine.toml", True)
+            if number % PYTHON_EVERY == 0:
+                with contextlib.suppress(ValueError, RecursionError):
+                    data = tomllib.loads(text)
+                    wild_scenes.judged(lambda data=data: coupling.make_scene(data, "dictionary"), "dictionary", False)
+        except Exception:
+            verdict, said = "fault", traceback.format_exc()
+            faults.append(f"scene {number}: {said[-300:]}")
+        slowest = max(slowest, time.monotonic() - begin)
+        verdicts[verdict if verdict != "warned" else "planned with a warning"] += 1
+        if verdict in ("planned", "warned"):
+            planned.append(text)
+    # compiles what the children, which share this process's memory, then find ready
+    coupling.run(small_scene(stop={"time": 0.01}), place / "compiled", threads=1)
+    simulated = random.Random(seed).sample(planned, min(SIMULATED, len(planned)))
+    for number, text in enumerate(simulated):
+        fault = simulation_fault(place, text, number)
+        faults += [fault] if fault else []
+    return {
+        "verdicts": dict(verdicts.most_common()), "faults": faults, "slowest_seconds": slowest,
+        "python_every": PYTHON_EVERY, "simulated": len(simulated), "patience": wild_scenes.PATIENCE,
+    }  # fmt: skip
+
+
+def simulation_fault(place, text, number):
+    """What is wrong with how a scene runs, "" where it ends well: finished and finite, or failed with a reason."""
+    import numpy as np
+    from damaged_files import in_a_process
+
+    from coupling import load_scene, run
+    from coupling.datasets import raw_groups
+
+    scene = place / f"run-{number}.toml"
+    scene.write_text(text, encoding="utf-8")
+    loaded = load_scene(scene)
+    if loaded.mpm.estimated_elements > 20_000 or (loaded.mpm.stop.time or 1.0) > 0.1:
+        return ""
+
+    def work():
+        folder = place / f"run-{number}"
+        run(loaded, folder, threads=1)
+        return bool(all(np.isfinite(a).all() for a in raw_groups(folder, ("lining", "history"))["lining"].values()))
+
+    how, answer = in_a_process(work, 120)
+    if how == "raised" and answer[0] & {"RunFailed", "MeshError", "RunRefused"}:
+        return ""
+    return "" if (how, answer) == ("returned", True) else f"run of scene {number} {how}: {str(answer)[-300:]}"
+
+
+def files(place, count, seed):
+    """Judge damaged files of every kind."""
+    import damaged_files
+
+    good = good_files(place / "whole")
+    verdicts, faults = {}, []
+    for kind, share in SHARES.items():
+        reader, _ = damaged_files.READERS[kind]
+        target, counts = place / f"damaged {kind}" / kind, Counter()
+        target.parent.mkdir()
+        if kind.endswith(".journal"):
+            (target.parent / "run.nc").write_bytes(good["run.nc"].read_bytes())
+        target.write_bytes(good[kind].read_bytes())
+        content, whole = good[kind].read_bytes(), reader(target)
+        # an incomplete journal belongs to a change that never began: then the file beside it counts
+        for number in range(round(share * count)):
+            target.write_bytes(damaged_files.damaged(random.Random(f"{seed} {kind} {number}"), content))
+            try:
+                verdict = damaged_files.judged(target, kind, whole)
+            except AssertionError as fault:
+                verdict = "fault"
+                faults.append(f"{kind} {number}: {str(fault)[-300:]}")
+            counts[verdict] += 1
+        verdicts[kind] = dict(counts.most_common())
+    return {"verdicts": verdicts, "faults": faults, "patience": damaged_files.PATIENCE}
+
+
+def good_files(place):
+    """One whole file of every kind, by kind."""
+    import h5netcdf
+    import numpy as np
+    from report_run import write_run
+    from small_event import small_scene
+
+    from coupling import checkpoint, journal
+    from coupling.datasets import CHECKED_FORMAT
+
+    place.mkdir()
+    run = write_run(place / "run.nc", models=("beam-spring",))
+    change = place / "change"
+    with journal.Overlay(run) as overlay:
+        with h5netcdf.File(overlay, "r+", libver=CHECKED_FORMAT) as file:
+            file["lining"]["soil_pressure"][0, :] = 1.0
+        journal._write_journal(change, overlay.all_pages(), overlay.size)
+    state = {"step_count": 7, "time": 0.1, "points": np.random.default_rng(1).normal(size=(20, 2000))}
+    stored = checkpoint.write_checkpoint(place, state, {"records": 3})
+    (place / "scene.toml").write_text(small_scene().source, encoding="utf-8")
+    (place / "study.toml").write_text(STUDY, encoding="utf-8")
+    return {
+        "run.nc": run, "checkpoint.h5": stored, "run.nc.journal": change, "scene.toml": place / "scene.toml",
+        "study.toml": place / "study.toml",
+    }  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,129 @@
+"""Kill a small run at random moments, resume it, and compare with the uninterrupted run bit for bit.
+
+    uv run python benchmarks/kills.py [--kills 200] [--seed 0]
+
+Writes its part of docs/robustness.md and docs/robustness.json. Every run is the command `gush run` in a process of its
+own that ends by SIGKILL at a moment drawn evenly over the life of the uninterrupted one: meshing, relaxation, stepping,
+writing, checkpoints, closing. Processes are forked from one that has compiled the kernels, so that a run takes a second
+and the kill falls into the run and not into its start.
+"""
+
+import argparse
+import os
+import random
+import shutil
+import signal
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "benchmarks")]
+KILLED_AGAIN = 0.25  # share of the resumed runs that are killed once more
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--kills", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="gush-kills-") as place:
+        result = kill_and_resume(Path(place), options.kills, random.Random(options.seed))
+    result["seed"] = options.seed
+    from robustness_page import write_part
+
+    write_part("kills", result)
+    for name, value in result.items():
+        print(f"{name}: {value}")
+    sys.exit(bool(result["different"]))
+
+
+def kill_and_resume(place, kills, draw):
+    """Kill and resume until `kills` kills have struck a run at work."""
+    from small_event import small_scene
+
+    from coupling.rerun import compare_bits
+
+    scene = place / "scene.toml"
+    scene.write_text(small_scene(interior="sink", stop={"time": 0.08}).source, encoding="utf-8")
+    command = ["run", "--no-figures", "--quiet", "--threads", "1", "--checkpoint-interval", "0"]
+    # twice: the first run compiles
+    run_here([*command, str(scene), "--out", str(place / "compiled")])
+    begin = time.time()
+    code = ended(forked([*command, str(scene), "--out", str(place / "whole")]), None)
+    assert code == 0, "the uninterrupted run must succeed"
+    # until the last line of its log; what follows only reads
+    life = (place / "whole" / "run.log").stat().st_mtime - begin
+    struck, different, codes, found = 0, [], Counter(), Counter()
+    begin = time.monotonic()
+    while struck < kills:
+        folder = place / "killed"
+        shutil.rmtree(folder, ignore_errors=True)
+        start, again = [*command, str(scene), "--out", str(folder)], [*command, "--resume", "--out", str(folder)]
+        code = ended(forked(start), draw.uniform(0.0, life))
+        while code == -signal.SIGKILL:
+            struck += 1
+            found[state_of(folder)] += 1
+            # a run killed before it had written its scene has nothing to resume
+            if not (folder / "scene.toml").exists():
+                again = [*start, "--overwrite"]
+            once_more = struck < kills and draw.random() < KILLED_AGAIN
+            code = ended(forked(again), draw.uniform(0.0, life) if once_more else None)
+        codes[code] += 1
+        comparison = compare_bits(place / "whole", folder) if code == 0 else {"identical": False, "differences": code}
+        if not comparison["identical"] or comparison["records_run"] != comparison["records_rerun"]:
+            different.append(str(comparison["differences"]))
+    return {
+        "kills": struck, "runs": sum(codes.values()), "identical": sum(codes.values()) - len(different),
+        "different": different, "found": dict(found), "life_seconds": life, "seconds": time.monotonic() - begin,
+    }  # fmt: skip
+
+
+def state_of(folder):
+    """What a run that was killed left behind, as a user would find it."""
+    from coupling.datasets import RunFileError, raw_groups, read_attributes
+
+    if not (folder / "scene.toml").exists():
+        return "nothing yet"
+    try:
+        records = len(raw_groups(folder, ("history",))["history"]["time"])
+        status = read_attributes(folder)["status"]
+    except RunFileError:
+        return "scene, no records yet"
+    if status == "finished":
+        return "finished"
+    kept = len(list(folder.glob("checkpoint-*.h5")))
+    return f"{'records' if records else 'no records'}, {kept} checkpoint{'s' * (kept != 1)}"
+
+
+def forked(arguments):
+    """Process that runs the command `gush` with these arguments."""
+    child = os.fork()
+    if child == 0:
+        os._exit(run_here(arguments))
+    return child
+
+
+def run_here(arguments):
+    """Exit code of the command in this process."""
+    from coupling.cli import app
+
+    try:
+        app(arguments)
+    except SystemExit as done:
+        return done.code or 0
+    return 0
+
+
+def ended(child, seconds):
+    """Exit code of a process; minus the signal where it was killed after that time."""
+    if seconds is not None:
+        time.sleep(seconds)
+        os.kill(child, signal.SIGKILL)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,124 @@
+"""The page docs/robustness.md, put together from what benchmarks/fuzz.py and benchmarks/kills.py measured."""
+
+import json
+import os
+import platform
+from datetime import UTC, datetime
+from pathlib import Path
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+DATA = DOCS / "robustness.json"
+
+
+def write_part(name, result):
+    """Store one part with machine, date and revision, and write the page anew."""
+    from coupling.provenance import revision
+
+    parts = json.loads(DATA.read_text(encoding="utf-8")) if DATA.exists() else {}
+    parts[name] = {
+        **result,
+        "date": datetime.now(UTC).date().isoformat(),
+        "revision": revision() or os.environ.get("GUSH_REVISION", ""),
+        "machine": f"{_processor()}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}",
+    }
+    DATA.write_text(json.dumps(parts, indent=1) + "\n", encoding="utf-8")
+    (DOCS / "robustness.md").write_text(page(parts), encoding="utf-8")
+
+
+def page(parts):
+    """Text of the page."""
+    lines = [
+        "# Bad input, damaged files, kills",
+        "",
+        "Written by the commands named below from their own measurements; the numbers are in robustness.json.",
+    ]
+    for name, write in (("scenes", _scenes), ("files", _files), ("kills", _kills)):
+        if name in parts:
+            lines += ["", *write(parts[name])]
+    return "\n".join(lines) + "\n"
+
+
+def _scenes(part):
+    rows = [f"| {name} | {count} |" for name, count in part["verdicts"].items()]
+    return [
+        "## Generated scenes",
+        "",
+        f"`uv run python benchmarks/fuzz.py scenes --count {part['count']} --seed {part['seed']}`. Each scene is the "
+        "text of a good one with up to six changes: numbers scaled, nudged or replaced by what is no number, keys "
+        "misspelt, dropped and doubled, names that lead out of the folder, bases that are devices or addresses, torn "
+        f"text. It is read as TOML and, every {part['python_every']}th time, as Python dictionaries too; each must be "
+        "planned, or refused with rule, field, value, remedy and the line of the file. Of those that are planned "
+        f"{part['simulated']} were simulated to their end or to a failure with a reason.",
+        "",
+        "| verdict | scenes |",
+        "|---|---|",
+        *rows,
+        "",
+        f"Faults (a traceback, more than {part['patience']:g} s, a message without its parts, a stored scene that is "
+        f"another one, a folder outside): {len(part['faults'])}. Slowest {part['slowest_seconds']:.2f} s, together "
+        f"{part['seconds']:.0f} s.",
+        *_faults(part["faults"]),
+        *_where(part),
+    ]
+
+
+def _files(part):
+    kinds = sorted({kind for counts in part["verdicts"].values() for kind in counts})
+    rows = [
+        f"| {name} | " + " | ".join(str(counts.get(kind, 0)) for kind in kinds) + " |"
+        for name, counts in part["verdicts"].items()
+    ]
+    return [
+        "## Damaged files",
+        "",
+        f"`uv run python benchmarks/fuzz.py files --count {part['count']} --seed {part['seed']}`. Bits flipped, blocks "
+        "zeroed, overwritten with noise, cut out, doubled or moved, files cut short, emptied or continued; then "
+        "everything that reads such a file, in a process of its own with limits on memory and time. A file must be "
+        "refused with its name and a remedy, or give what the whole file gives.",
+        "",
+        "| file | " + " | ".join(kinds) + " |",
+        "|---|" + "---|" * len(kinds),
+        *rows,
+        "",
+        f"Faults (a traceback, a crash, more than {part['patience']:g} s, other values than the whole file's without "
+        f"a word, a file changed by a command that refused it): {len(part['faults'])}. Together "
+        f"{part['seconds']:.0f} s.",
+        *_faults(part["faults"]),
+        *_where(part),
+    ]
+
+
+def _kills(part):
+    rows = [f"| {name} | {count} |" for name, count in sorted(part["found"].items(), key=lambda pair: -pair[1])]
+    return [
+        "## Kills",
+        "",
+        f"`uv run python benchmarks/kills.py --kills {part['kills']} --seed {part['seed']}`. A small run of "
+        f"{part['life_seconds']:.1f} s is ended by SIGKILL at a moment drawn evenly over its life, and resumed; every "
+        "fourth resumed one is killed again. What the kills left behind:",
+        "",
+        "| state | kills |",
+        "|---|---|",
+        *rows,
+        "",
+        f"{part['kills']} kills in {part['runs']} runs; {part['identical']} of {part['runs']} runs ended with the bits "
+        f"of the uninterrupted run, in {part['seconds']:.0f} s.",
+        *_faults(part["different"]),
+        *_where(part),
+    ]
+
+
+def _faults(faults):
+    return ["", *(f"- {fault}" for fault in faults[:20])] if faults else []
+
+
+def _where(part):
+    return ["", f"Measured {part['date']} at revision {part['revision'] or 'unknown'} on {part['machine']}."]
+
+
+def _processor():
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="ascii", errors="replace").splitlines()
+    except OSError:
+        return platform.machine()
+    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.machine())

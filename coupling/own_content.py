@@ -1,0 +1,40 @@
+"""An HDF5 file is data of its own: what would make the library read other files is refused before anything is read."""
+
+
+class ForeignContent(ValueError):
+    """A file that shows the content of other files as its own."""
+
+
+def require_own_content(file):
+    """Refuse external links, external storage and virtual datasets; a damaged file raises what the library raises.
+
+    Parameters
+    ----------
+    file : path or file object
+
+    Raises
+    ------
+    ForeignContent
+    OSError, KeyError, RuntimeError, ValueError
+        From the library.
+    """
+    import h5py
+
+    with h5py.File(file, "r") as content:
+        _require(content)
+
+
+def _require(group):
+    import h5py
+
+    for name in group:
+        link = group.get(name, getlink=True)
+        if isinstance(link, h5py.ExternalLink):
+            raise ForeignContent(f"'{group.name}/{name}' is a link into the file '{link.filename}'")
+        if isinstance(link, h5py.SoftLink):
+            raise ForeignContent(f"'{group.name}/{name}' is a link to '{link.path}'")  # nothing here writes one
+        entry = group[name]
+        if isinstance(entry, h5py.Group):
+            _require(entry)
+        elif isinstance(entry, h5py.Dataset) and (entry.external or entry.is_virtual):
+            raise ForeignContent(f"'{entry.name}' has its values in other files")

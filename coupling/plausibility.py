@@ -1,0 +1,164 @@
+"""Numbers that are possible but of another order of magnitude than any soil, water or lining: usually a wrong unit."""
+
+import math
+
+PRESSURE = {"kPa": 1e3, "MPa": 1e6, "GPa": 1e9}
+LENGTH = {"mm": 1e-3, "cm": 1e-2}
+PERCENT = {"percent": 1e-2}
+RADIANS = {"rad": 180 / math.pi}
+DENSITY = {"t/m3": 1e3}
+FORCE = {"kN": 1e3, "MN": 1e6}
+
+#: Table and key to (lowest, highest, unit, other units that people use with their factors). Zero always passes: it
+#: leaves a property out. The ranges are those of handbooks, widened until soft clay, rock and small models fit in.
+USUAL = {
+    "soils": {
+        "youngs_modulus": (2e5, 2e10, "Pa", PRESSURE),
+        "cohesion": (100, 5e6, "Pa", PRESSURE),
+        "tensile_strength": (100, 5e6, "Pa", PRESSURE),
+        "friction_angle": (5, 50, "degrees", RADIANS),
+        "dilatancy_angle": (0.7, 30, "degrees", RADIANS),
+        "porosity": (0.15, 0.8, "as a fraction", PERCENT),
+        "loose_porosity": (0.2, 0.9, "as a fraction", PERCENT),
+        "grain_density": (1500, 4000, "kg/m3", DENSITY),
+        "hydraulic_conductivity": (1e-12, 0.1, "m/s", {"m/day": 1 / 86400, "mm/s": 1e-3}),
+        "k0": (0.1, 4, "as a ratio", PERCENT),
+    },
+    "water": {
+        "table_depth": (0.01, 500, "m", LENGTH),
+        "density": (900, 1300, "kg/m3", DENSITY),
+        "bulk_modulus": (5e6, 5e9, "Pa", PRESSURE),
+    },
+    "tunnels": {
+        "cover": (0.3, 500, "m", LENGTH),
+        "outer_diameter": (0.5, 25, "m", LENGTH),
+        "inner_diameter": (0.5, 25, "m", LENGTH),
+        "friction_coefficient": (0.02, 1.2, "as a ratio", PERCENT),
+    },
+    "gate": {"width": (0.005, 3, "m", LENGTH)},
+    "discretisation": {
+        "element_size": (0.005, 50, "m", LENGTH),
+        "element_size_lining": (0.005, 50, "m", LENGTH),
+        "element_size_interior": (0.005, 50, "m", LENGTH),
+    },
+    "ring": {
+        "outer_diameter": (0.5, 25, "m", LENGTH),
+        "inner_diameter": (0.5, 25, "m", LENGTH),
+        "concrete_modulus": (1e9, 5e11, "Pa", PRESSURE),
+        "concrete_unit_weight": (1e3, 2e5, "N/m3", {"kN/m3": 1e3}),
+        "joint_rotational_stiffness": (1e6, 1e12, "N m/rad", FORCE),
+        "joint_normal_stiffness": (1e6, 1e13, "N/m", FORCE),
+        "joint_shear_stiffness": (1e6, 1e13, "N/m", FORCE),
+        "joint_friction_coefficient": (0.02, 2, "as a ratio", PERCENT),
+    },
+    "ring.ground": {
+        "youngs_modulus": (2e5, 2e10, "Pa", PRESSURE),
+        "cohesion": (100, 5e6, "Pa", PRESSURE),
+        "friction_angle": (5, 50, "degrees", RADIANS),
+        "vertical_stress": (500, 5e7, "Pa", PRESSURE),
+        "horizontal_stress": (100, 5e7, "Pa", PRESSURE),
+        "limit_pressure_normal": (500, 1e9, "Pa", PRESSURE),
+        "limit_pressure_tangential": (500, 1e9, "Pa", PRESSURE),
+    },
+}
+
+
+def warnings_of(scene):
+    """What a user should look at again before a run: one sentence a number, empty where all is usual.
+
+    Parameters
+    ----------
+    scene : coupling.Scene
+    """
+    data = scene.mpm.model_dump(exclude_none=True)
+    if scene.ring is not None:
+        data["ring"] = scene.ring.model_dump(exclude_none=True)
+    told = [f"{shown(path)} {hint}" for path, hint in hints(data).items() if not _follows(path, data)]
+    stop, output = scene.mpm.stop, scene.mpm.output
+    if stop.time is not None and output.interval >= stop.time:
+        told.append(
+            f"output.interval {output.interval:g} s is not below stop.time {stop.time:g} s: only the first and the "
+            f"last state are recorded; write e.g. {stop.time / 100:g}"
+        )
+    return told
+
+
+def hints(data):
+    """Unusual numbers of a scene's nested dictionary, validated or not.
+
+    Returns
+    -------
+    dict of tuple to str
+        Path of the key to what to think of.
+    """
+    found = {}
+    for name, usual in USUAL.items():
+        table = data
+        for part in name.split("."):
+            table = table.get(part) if isinstance(table, dict) else None
+        tables = enumerate(table) if isinstance(table, list | tuple) else [(None, table)]
+        for index, entry in tables:
+            path = (*name.split("."), *(() if index is None else (index,)))
+            for key, (low, high, unit, others) in usual.items():
+                value = entry.get(key) if isinstance(entry, dict) else None
+                hint = _hint(value, low, high, unit, others)
+                if hint:
+                    found[*path, key] = hint
+    found |= _angles_in_radians(data)
+    return found
+
+
+def shown(path):
+    """A path as people write it: soils[0].porosity."""
+    text = ""
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f"{'.' * bool(text)}{part}"
+    return text
+
+
+def _hint(value, low, high, unit, others):
+    if not _is_number(value) or value == 0 or low <= value <= high:
+        return ""
+    hint = f"is unusual, got {value:g}: between {low:g} and {high:g} {unit} is usual"
+    for other, factor in others.items():
+        if low <= value * factor <= high:
+            return f"{hint}; if {value:g} {other} was meant, write {value * factor:.6g}"
+    return f"{hint}; check the number and its unit"
+
+
+def _angles_in_radians(data):
+    """The gate or all joints within a few degrees of the crown, at simple fractions of pi."""
+    found = {}
+    gate, ring = data.get("gate"), data.get("ring")
+    angle = gate.get("angle") if isinstance(gate, dict) else None
+    if _is_number(angle) and 0 < angle <= 2 * math.pi + 1e-3:
+        steps = angle / (math.pi / 12)
+        if abs(steps - round(steps)) < 0.005 and abs(2 * angle - round(2 * angle)) > 1e-9:
+            found["gate", "angle"] = (
+                f"is a simple fraction of pi, got {angle:g} degrees; if radians were meant, write "
+                f"{math.degrees(angle):.4g}"
+            )
+    joints = ring.get("joint_angles") if isinstance(ring, dict) else None
+    if isinstance(joints, list | tuple) and len(joints) > 1 and all(_is_number(joint) for joint in joints):
+        if 0 <= min(joints) and max(joints) <= 2 * math.pi:
+            degrees = ", ".join(f"{math.degrees(joint):.4g}" for joint in joints)
+            found["ring", "joint_angles"] = (
+                f"all lie within 6.3 degrees of the crown; if radians were meant, write [{degrees}]"
+            )
+    return found
+
+
+def _follows(path, data):
+    """Whether a number of the ring only repeats one of tunnel or soil, where it is told of."""
+    if path[0] != "ring":
+        return False
+    others = data.get("tunnels", ()) if path[1] != "ground" else data.get("soils", ())
+    value = data
+    for part in path:
+        value = value[part]
+    return any(entry.get(path[-1]) == value for entry in others)
+
+
+def _is_number(value):
+    # an integer of any length has no place in a scene, and none in a float
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300

@@ -1,0 +1,185 @@
+"""Files of a run with damage in them, and what everything that reads them has to make of it."""
+
+import os
+import pickle
+import re
+import resource
+import signal
+import traceback
+
+import numpy as np
+
+#: Longest that reading a damaged file may take [s], and memory that it may ask for beyond what is in use [bytes].
+PATIENCE, MEMORY = 20, 4_000_000_000
+
+
+def damaged(random, content):
+    """Bytes of a file after something happened to it; never what they were."""
+    size = len(content)
+    at, length = random.randrange(size), random.choice((1, 8, 512, 4096))
+    kind = random.randrange(9)
+    if kind <= 2:
+        changed = bytearray(content)
+        for _ in range(random.choice((1, 1, 1, 4, 64))):
+            changed[random.randrange(size)] ^= 1 << random.randrange(8)
+        result = bytes(changed)
+    elif kind == 3:
+        result = content[:at] + random.randbytes(length) + content[at + length :]
+    elif kind == 4:
+        result = content[:at] + bytes(length) + content[at + length :]
+    elif kind == 5:
+        result = content[:at]
+    elif kind == 6:
+        result = content[:at] + content[at + length :]
+    elif kind == 7:
+        result = content[:at] + content[at : at + length] + content[at:]
+    else:
+        # the head is small, and the first thing that a library believes
+        at = random.randrange(min(size, 600))
+        result = content[:at] + random.randbytes(4) + content[at + 4 :]
+    return result if result != content else damaged(random, content)
+
+
+def in_a_process(work, seconds=PATIENCE):
+    """What `work` returns, or how it ended: a child with limits keeps a crash, a hang or a flood to itself.
+
+    Returns
+    -------
+    str, object
+        "returned" and the value; "raised" and (type name, message, traceback); "killed" and the signal's name.
+    """
+    read, write = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(read)
+        code = 1
+        try:
+            used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+            resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, used + MEMORY))
+            signal.alarm(seconds)
+            try:
+                answer = "returned", work()
+            except Exception as error:
+                answer = "raised", (_kinds(error), str(error), traceback.format_exc())
+            with os.fdopen(write, "wb") as out:
+                pickle.dump(answer, out)
+            code = 0
+        finally:
+            os._exit(code)
+    os.close(write)
+    with os.fdopen(read, "rb") as answer:
+        data = answer.read()
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    if code < 0:
+        return "killed", signal.Signals(-code).name
+    return pickle.loads(data) if code == 0 else ("killed", f"exit code {code}")
+
+
+def _kinds(error):
+    return {kind.__name__ for kind in type(error).__mro__}
+
+
+def run_content(path):
+    """Everything that the program reads of a run file, as arrays and texts that can be compared."""
+    from coupling.datasets import read_run
+    from coupling.info import describe
+    from coupling.pressure_source import read_source
+    from coupling.report.page import collect
+
+    content = {"info": describe(path)["facts"]}
+    for node in read_run(path).subtree:
+        content |= {f"{node.path}@{name}": str(value) for name, value in node.attrs.items()}
+        for name, variable in node.variables.items():
+            content[f"{node.path}/{name}"] = np.asarray(variable.values)
+            content |= {f"{node.path}/{name}@{key}": str(value) for key, value in variable.attrs.items()}
+    source = read_source(path)
+    content["ring"] = source.ring.model_dump_json()
+    content["page"] = len(str(collect(path)["numbers"]))
+    return content
+
+
+def checkpoint_content(path):
+    """State and notes of a checkpoint."""
+    from coupling.checkpoint import read_checkpoint
+
+    state, about = read_checkpoint(path)
+    return {**{name: np.asarray(value) for name, value in state.items()}, "about": str(about)}
+
+
+def journal_content(path):
+    """A run file as it shows with a journal beside it."""
+    from coupling.datasets import raw_groups
+
+    groups = raw_groups(path.with_name(path.name.removesuffix(".journal")))
+    return {f"{group}/{name}": array for group, arrays in groups.items() for name, array in arrays.items()}
+
+
+def scene_content(path):
+    """A scene file."""
+    from coupling.scene import load_scene
+
+    return {"source": load_scene(path).source}
+
+
+def study_content(path):
+    """A study file and its cases."""
+    from coupling.studies.design import cases, load_study
+
+    return {"cases": str([case.key for case in cases(load_study(str(path)))])}
+
+
+REFUSALS = {"RunFileError", "RunRefused", "SceneError", "StudyError", "CheckpointDamaged"}
+#: Kind of file to its reader, and whether it guards its content: then other content must never pass unnoticed.
+READERS = {
+    "run.nc": (run_content, True),
+    "checkpoint.h5": (checkpoint_content, True),
+    "run.nc.journal": (journal_content, True),
+    "scene.toml": (scene_content, False),
+    "study.toml": (study_content, False),
+}
+#: Texts lie in HDF5 without a checksum; they are shown, and nothing is computed from them but the guarded scene.
+TEXT = re.compile(r"@|^info$")
+
+
+def judged(path, kind, whole):
+    """What becomes of a damaged file.
+
+    Parameters
+    ----------
+    path : path
+    kind : str
+        Of `READERS`.
+    whole : dict
+        What the reader gives for the undamaged file.
+
+    Returns
+    -------
+    str
+        "refused"; "same content"; "another text" (a text, or a scene, that differs and is valid).
+
+    Raises
+    ------
+    AssertionError
+    """
+    reader, guarded = READERS[kind]
+    before = path.read_bytes()
+    how, answer = in_a_process(lambda: reader(path))
+    assert path.read_bytes() == before, "the file was changed by reading it"
+    assert how != "killed", f"{kind}: the process was ended by {answer}"
+    if how == "raised":
+        kinds, message, trace = answer
+        assert kinds & REFUSALS, f"{kind}: {trace[-900:]}"
+        assert path.name.removesuffix(".journal") in message or "scene" in message, message
+        assert kind in ("checkpoint.h5", "run.nc.journal") or ";" in message or "missing" in message, message
+        return "refused"
+    other = [name for name in sorted(whole.keys() | answer.keys()) if not _equal(whole.get(name), answer.get(name))]
+    if not other:
+        return "same content"
+    assert not guarded or all(TEXT.search(name) for name in other), f"{kind}: other content without a word: {other[:5]}"
+    return "another text"
+
+
+def _equal(one, other):
+    if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
+        return one.dtype == other.dtype and one.shape == other.shape and one.tobytes() == other.tobytes()
+    return type(one) is type(other) and one == other
