@@ -41,6 +41,8 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     for name in plan.parameters:
         values = np.array([case.parameters[name] for case in cases])
         result = result.assign_coords({name.replace(".", "_"): ("case", values, {"long_name": name})})
+    if "scene" in plan.parameters:
+        result = result.assign_coords(_of_scenes(cases))
     done = np.array([case in there for case in cases])
     result["status"] = ("case", np.where(done, "finished", "failed"))
     result["message"] = ("case", np.array([failures.get(case.key, "") for case in cases], dtype=str))
@@ -51,6 +53,25 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
         "failed": int((~done).sum()),
     }
     return result
+
+
+def _of_scenes(cases):
+    """Coordinates that tell scenes apart where the scene itself is a parameter."""
+    soils = [case.scene.mpm.soils[0] for case in cases]
+    tunnels = [case.scene.mpm.tunnels[:1] for case in cases]
+    gates = [case.scene.mpm.gate for case in cases]
+    columns = {
+        "gate_angle": ([np.nan if gate is None else gate.angle for gate in gates], "degree", "angle of the gate"),
+        "cover": ([t[0].cover if t else np.nan for t in tunnels], "m", "cover of the first tunnel"),
+        "soil": ([soil.name for soil in soils], "1", "uppermost soil"),
+        "cohesion": ([soil.cohesion for soil in soils], "Pa", "its cohesion"),
+        "friction_angle": ([soil.friction_angle for soil in soils], "degree", "its friction angle"),
+        "youngs_modulus": ([soil.youngs_modulus for soil in soils], "Pa", "its Young's modulus"),
+    }
+    return {
+        name: ("case", np.array(values), {"units": units, "long_name": text})
+        for name, (values, units, text) in columns.items()
+    }
 
 
 def read_study(folder: str | Path):
