@@ -41,7 +41,7 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int) 
     import tomllib
 
     from coupling.datasets import read_history, read_pressures, write_response
-    from coupling.run import respond, run
+    from coupling.run import respond, respond_beside, run
     from coupling.run_folder import RUN_FILE, RunRefused
     from coupling.scene import make_scene
     from coupling.studies.progress import CaseProgress
@@ -67,6 +67,7 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int) 
     for name in backends if scene.ring is not None else ():
         responses[name] = respond(scene, pressures, name)
         write_response(run_folder / RUN_FILE, responses[name], name)
+        respond_beside(scene, run_folder, name)
     last = scene.mpm.stop.inflow_mass or float(history["inflow_mass"].values[-1])
     result = at_inflow_masses(pressures, history, responses, np.linspace(0.0, last, records))
     result.attrs["scene"] = source

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -74,13 +75,8 @@ def _of_scenes(cases):
     }
 
 
-def read_study(folder: str | Path):
-    """The dataset of a study that ran earlier.
-
-    Parameters
-    ----------
-    folder : str or path
-        As given to :func:`coupling.study`.
+def stored_cases(folder: str | Path) -> tuple[Study, list[Case], dict[str, str]]:
+    """Definition, cases and failures of a study that ran earlier, also by an earlier version of the program.
 
     Raises
     ------
@@ -98,5 +94,25 @@ def read_study(folder: str | Path):
     except ValueError as error:
         raise StudyError(f"study folder '{folder}': {STUDY_FILE} must be that of a study, got: {error}") from None
     status = json.loads((folder / STATUS_FILE).read_text(encoding="utf-8")) if (folder / STATUS_FILE).is_file() else {}
-    failures = {key: entry["message"] for key, entry in status.items() if entry["status"] == "failed"}
-    return collect(plan, cases(plan), folder, failures)
+    found = cases(plan)
+    # the keys that the cases had when they ran: the sources may have changed since
+    if [entry["parameters"] for entry in status.values()] == [case.parameters for case in found]:
+        found = [replace(case, key=key) for case, key in zip(found, status, strict=True)]
+    return plan, found, {key: entry["message"] for key, entry in status.items() if entry["status"] == "failed"}
+
+
+def read_study(folder: str | Path):
+    """The dataset of a study that ran earlier.
+
+    Parameters
+    ----------
+    folder : str or path
+        As given to :func:`coupling.study`.
+
+    Raises
+    ------
+    coupling.studies.design.StudyError
+        No study there.
+    """
+    plan, found, failures = stored_cases(folder)
+    return collect(plan, found, Path(folder), failures)
