@@ -60,8 +60,8 @@ def deformation(study, inflow_mass, model="beam-spring"):
         f"at {inflow_mass:.0f} kg/m, {model}", extra_rows=1,
     )  # fmt: skip
     bars = {
-        "convergence_horizontal": "horizontal\nconvergence",
-        "convergence_vertical": "vertical\nconvergence",
+        "convergence_horizontal": "horizontal",
+        "convergence_vertical": "vertical",
         "settlement": "settlement",
     }
     with matplotlib.rc_context(STYLE):
@@ -70,7 +70,7 @@ def deformation(study, inflow_mass, model="beam-spring"):
             values = [1e3 * (now[name] - first[name]) for name in bars]
             _bars(axis, study, group, names, values, list(bars.values()))
             if column == 0:
-                axis.set_ylabel("additional [mm]")
+                axis.set_ylabel("additional convergence\nand settlement [mm]")
     return figure
 
 
@@ -89,9 +89,9 @@ def joint_deformation(study, inflow_mass, model="beam-spring"):
             row[0].set_ylabel(f"additional {title}")
         for axis, group in zip(axes[0], GROUPS, strict=True):
             axis.set_title(f"by {group}")
-            axis.legend(fontsize=6, loc="best")
         for axis in axes[-1]:
             axis.set_xlabel("joint")
+            axis.legend(fontsize=6, loc="upper center", bbox_to_anchor=(0.5, -0.28), ncols=3)
         figure.suptitle(f"at {inflow_mass:.0f} kg/m, {model}", fontsize=9)
     return figure
 
@@ -122,8 +122,12 @@ def _polar(study, rows, title, extra_rows=0):
                     axis.set_rorigin(low - 0.4 * (high - low))
                 axis.set_ylim(low - 0.05 * (high - low) * (low < 0), high + 0.05 * (high - low))
                 _radial_ticks(axis, None, 4)
-                axis.set_title(f"by {group}" + (f"\n{name}" if c == 1 else "\n"), pad=8)
-                axis.legend(fontsize=6, loc="upper center", bbox_to_anchor=(0.5, -0.08), ncols=2)
+                if r == 0:
+                    axis.set_title(f"by {group}", pad=8)
+                if c == 0:
+                    axis.set_ylabel(name, labelpad=28)
+                if r == len(rows) - 1:
+                    axis.legend(fontsize=6, loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2)
         figure.suptitle(title, fontsize=9)
     return figure
 

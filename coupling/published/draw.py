@@ -27,9 +27,9 @@ def draw_case(case, folder: str | Path) -> dict[str, Path]:
 
     response, pressures, masses = case.responses["beam-spring"], case.of_gate, case.masses
     snapshots = postprocess.with_inflow(case.points, case.history)
-    at_half = int(np.abs(snapshots["inflow_mass"] - case.half).argmin())
+    at_half = int(np.abs(snapshots["inflow_mass"].values - case.half).argmin())
     fields = postprocess.with_inflow(postprocess.element_fields(case.points, case.mesh), case.history)
-    record = int(np.abs(response["inflow_mass"] - case.half).argmin())
+    record = int(np.abs(response["inflow_mass"].values - case.half).argmin())
     return _saved(
         folder,
         {

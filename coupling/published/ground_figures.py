@@ -101,10 +101,10 @@ def stresses_along_axes(horizontal, vertical, masses):
         figure = Figure(figsize=(7.2, 5.4), layout="constrained")
         axes = figure.subplots(2, 2)
         for axis, (data, name, title) in zip(axes.flat, panels, strict=True):
-            # cells inside the lining have no ground: the line breaks there
-            step = np.diff(data["distance"].values).min()
-            grid = np.arange(data["distance"].values[0], data["distance"].values[-1] + 0.5 * step, step)
-            whole = data[[name, "inflow_mass"]].reindex(distance=grid, method="nearest", tolerance=0.1 * step)
+            # the line breaks at the lining, not where a cell between two elements happens to hold no point
+            known = data["distance"].values
+            breaks = 0.5 * (known[1:] + known[:-1])[np.diff(known) > 0.4 * diameter]
+            whole = data[[name, "inflow_mass"]].reindex(distance=np.sort(np.append(known, breaks)))
             place = whole["distance"] / diameter
             axis.plot(place, whole[name].isel(time=0) / 1e3, color=INITIAL, ls=(0, (4, 2)), lw=1.1, label="initial")
             for mass, colour in zip(masses, mass_colours(len(masses)), strict=True):

@@ -90,10 +90,10 @@ def at_study_inflow(study, inflow_mass: float):
             np.interp(inflow_mass, mass, one["progress"].values, right=np.nan) if np.isfinite(mass).all() else np.nan
         )
         if not np.isfinite(share):
-            parts.append(one.isel(progress=0, drop=True).drop_vars("inflow_mass") * np.nan)
+            parts.append(one.isel(progress=0, drop=True) * np.nan)
             continue
         parts.append(one.drop_vars("inflow_mass").interp(progress=share, assume_sorted=True).drop_vars("progress"))
-    result = xr.concat(parts, dim="case")
+    result = xr.concat(parts, dim="case", coords="different", compat="equals", join="outer")
     for name in dependent.data_vars:
         result[name].attrs = dict(dependent[name].attrs)
     return result.assign_coords(inflow_mass=inflow_mass)
