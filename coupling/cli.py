@@ -15,6 +15,7 @@ from rich.table import Table
 
 from coupling.exit_codes import DIFFERENT, JsonPath, checked_json, failures, warn, write_json
 from coupling.measure_commands import accuracy_command, bench_command, stability_command, study_command
+from coupling.published.command import figures_command, published_command
 from coupling.result_commands import export_command, info_command, report_command
 
 app = typer.Typer(
@@ -277,6 +278,8 @@ app.command("info")(info_command)
 app.command("bench")(bench_command)
 app.command("accuracy")(accuracy_command)
 app.command("study")(study_command)
+app.command("figures")(figures_command)
+app.command("published")(published_command)
 app.command("stability")(stability_command)
 
 

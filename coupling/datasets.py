@@ -2,7 +2,8 @@
 
 One netCDF-4 file a run, SI units, angles in degrees from the crown, clockwise. Groups: `/lining` (pressures on a
 uniform theta grid), `/history` (inflow, zones, balances, time step), `/points` (snapshots), `/mesh`, and
-`/structure/<model>` (responses). The root carries attributes only: provenance and `status`.
+`/structure/<model>` (responses; those of tunnels without the gate in `/structure_tunnel_<k>/<model>`). The root
+carries attributes only: provenance and `status`.
 """
 
 import contextlib
@@ -353,9 +354,19 @@ def write_attributes(path, **attributes):
             file.attrs[name] = value
 
 
-def write_response(path, response, model="beam-spring"):
-    """Write the response of a lining model to `/structure/<model>`, in place of an earlier one, as a whole."""
+def structure_group(model, tunnel=None):
+    """Group of a response: `structure/<model>` for the tunnel with the gate, `structure_tunnel_<k>/<model>` for others.
+
+    tunnel : int or None, None: the one with the gate.
+    """
+    return f"structure/{model}" if tunnel is None else f"structure_tunnel_{tunnel}/{model}"
+
+
+def write_response(path, response, model="beam-spring", tunnel=None):
+    """Write the response of a lining model to its :func:`structure_group`, in place of an earlier one, as a whole."""
     import h5py
+
+    group = structure_group(model, tunnel)
 
     path = Path(path).resolve()
     recover(path)
@@ -364,10 +375,9 @@ def write_response(path, response, model="beam-spring"):
         shutil.copy(path, beside)
         with _damage_named(path):
             with h5py.File(beside, "a", locking=False, libver=CHECKED_FORMAT) as file:
-                structure = file.require_group("structure")
-                if model in structure:
-                    del structure[model]
-            write_dataset(beside, response, f"structure/{model}")
+                if group in file:
+                    del file[group]
+            write_dataset(beside, response, group)
         put_in_place(beside, path)
     finally:
         beside.unlink(missing_ok=True)
@@ -468,10 +478,9 @@ def _group_names(file):
     import h5netcdf
 
     with _shown(file) as shown, h5netcdf.File(shown, "r") as content:
-        names = [name for name in content.groups if name != "structure"]
-        if "structure" in content.groups:
-            names += [f"structure/{model}" for model in content["structure"].groups]
-    return names
+        answered = [name for name in content.groups if name.startswith("structure")]
+        names = [name for name in content.groups if name not in answered]
+        return names + [f"{name}/{model}" for name in answered for model in content[name].groups]
 
 
 def read_attributes(path):
@@ -537,9 +546,9 @@ def read_mesh(path):
     return read_group(path, "mesh")
 
 
-def read_response(path, model="beam-spring"):
-    """The response of the lining: `/structure/<model>`, in memory."""
-    return read_group(path, f"structure/{model}")
+def read_response(path, model="beam-spring", tunnel=None):
+    """The response of the lining of the tunnel with the gate, or of another `tunnel` by its number, in memory."""
+    return read_group(path, structure_group(model, tunnel))
 
 
 def read_group(path, group, row=None):

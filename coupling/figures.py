@@ -161,7 +161,8 @@ def pressures_polar(pressures, time=-1, tunnel=None):
             axis.plot(*_closed(angle, now[name].values / 1e3), color=NOW, label=_moment(now))
             axis.set_ylim(0, 1.08 * max(first[name].max(), now[name].max()) / 1e3)
             _radial_ticks(axis, geometry)
-            geometry.mark_gate(axis)
+            if tunnel is None or tunnel == geometry.tunnel:
+                geometry.mark_gate(axis)
             axis.set_title(title, pad=12)
         _legend_below(figure, axes[0])
     return figure
@@ -320,7 +321,11 @@ def draw_run(run, folder):
         "deformed_ring": (deformed_ring, lambda: read_response(run)),
         "inflow": (inflow, lambda: read_history(run)),
     }
-    lined = "tunnel_x" in read_pressures(run).attrs
+    attributes = read_pressures(run).attrs
+    lined = "tunnel_x" in attributes
+    for tunnel in range(len(np.atleast_1d(attributes.get("tunnel_x", [])))):
+        if tunnel != int(attributes.get("gate_tunnel", 0)):
+            sources |= _of_tunnel(run, tunnel)
     written = []
     for name, (draw, read) in sources.items():
         if not lined and name != "inflow":
@@ -328,13 +333,29 @@ def draw_run(run, folder):
         try:
             dataset = read()
         except RunFileError:
-            if name in ("internal_forces", "deformed_ring", "fields"):
+            if name.startswith(("internal_forces", "deformed_ring", "fields")):
                 continue  # a scene without a ring has no response, and one may keep no points
             raise
         path = folder / f"{name}.png"
         draw(dataset).savefig(path, dpi=RESOLUTION)
         written.append(path)
     return written
+
+
+def _of_tunnel(run, tunnel):
+    """Pictures of a tunnel without the gate: name to what draws and what reads it."""
+
+    def pressures(dataset):
+        return pressures_polar(dataset, tunnel=tunnel)
+
+    def response():
+        return read_response(run, tunnel=tunnel)
+
+    return {
+        f"pressures_tunnel_{tunnel}": (pressures, lambda: read_pressures(run)),
+        f"internal_forces_tunnel_{tunnel}": (internal_forces, response),
+        f"deformed_ring_tunnel_{tunnel}": (deformed_ring, response),
+    }
 
 
 class _Geometry:

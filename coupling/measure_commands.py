@@ -122,7 +122,7 @@ def stability_command(
 
 def study_command(
     study: Annotated[
-        str, typer.Argument(help="A built-in study (table-2, permeability, mesh, backend) or a TOML file.")
+        str, typer.Argument(help="A built-in study (table-2, sensitivity, permeability, mesh, backend) or a TOML file.")
     ],
     out: Annotated[
         Path | None, typer.Option(help="Folder; studies/NAME when left out. What is there is not rerun.")
@@ -139,7 +139,7 @@ def study_command(
     with failures(), checked_json(json_path):
         from coupling.studies.command import run_study
 
-        data = run_study(study, out, workers, scheduler, Console(stderr=True).print)
+        data = run_study(study, out, workers, scheduler, Console(stderr=True))
         write_json(json_path, data)
         if str(json_path) != "-":
             console = Console()

@@ -106,6 +106,7 @@ def finish(scene, folder, progress):
         progress({"stage": "respond"})
         response = respond(scene, read_pressures(folder))
         write_response(folder / RUN_FILE, response)
+        respond_beside(scene, folder)
         write_quality(folder / RUN_FILE, response)
     progress({"stage": "figures"})
     return draw_run(folder, folder / FIGURES)
@@ -126,6 +127,31 @@ def respond(scene, pressures, backend="beam-spring"):
     if "tunnel" in pressures.dims:
         pressures = pressures.isel(tunnel=scene.mpm.gate.tunnel if scene.mpm.gate else 0, drop=True)
     return respond_by_name(scene.ring, pressures, backend)
+
+
+def respond_beside(scene, folder, backend="beam-spring"):
+    """Store the responses of the tunnels without the gate that have the ring's diameters; returns their numbers.
+
+    Their ground is that at their own axis; what the scene says of it stands for the tunnel with the gate.
+    """
+    from coupling.scene import ground_at_axis
+
+    if scene.ring is None:
+        return []
+    tunnels, gate = scene.mpm.tunnels, scene.mpm.gate.tunnel if scene.mpm.gate else 0
+    answered = []
+    for k, tunnel in enumerate(tunnels):
+        diameters = (tunnel.outer_diameter, tunnel.inner_diameter)
+        if k == gate or diameters != (scene.ring.outer_diameter, scene.ring.inner_diameter):
+            continue
+        ring = scene.ring
+        if ring.ground is not None and tunnel.axis_depth != tunnels[gate].axis_depth:
+            there = ground_at_axis(scene.mpm, tunnel.axis_depth)
+            ring = ring.model_copy(update={"ground": ring.ground.model_copy(update=there)})
+        response = respond_by_name(ring, read_pressures(folder).isel(tunnel=k, drop=True), backend)
+        write_response(folder / RUN_FILE, response, backend, tunnel=k)
+        answered.append(k)
+    return answered
 
 
 def respond_by_name(ring, pressures, backend, **options):

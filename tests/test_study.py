@@ -7,6 +7,7 @@ import signal
 import numpy as np
 import pytest
 import xarray as xr
+from small_event import small_scene
 from test_cli import gush
 
 import coupling
@@ -14,6 +15,7 @@ from coupling.studies import case as case_module
 from coupling.studies import execute
 from coupling.studies.case import at_inflow_masses
 from coupling.studies.design import Study, StudyError, cases, load_study, study_names
+from coupling.studies.progress import CaseProgress, study_state
 from coupling.studies.sensitivity import scatter, sensitivity, tornado
 
 TINY = {
@@ -72,6 +74,12 @@ def test_designs_give_their_combinations():
         (60.0, 0.5),
         (90.0, 0.6),
     ]
+    alone = load_study(TINY | {"design": "one-at-a-time"})
+    assert alone.combinations() == [
+        {}, {"gate.angle": 60.0}, {"gate.angle": 90.0}, {"soils.0.k0": 0.5}, {"soils.0.k0": 0.6},
+    ]  # fmt: skip
+    # what a case leaves as it is stands with it all the same
+    assert [c.parameters["soils.0.k0"] for c in cases(alone)] == [0.577, 0.577, 0.577, 0.5, 0.6]
     ranges = {
         "gate.angle": {"low": 0, "high": 180},
         "soils.0.hydraulic_conductivity": {"low": 1e-5, "high": 1e-3, "scale": "log"},
@@ -105,7 +113,14 @@ def test_parameters_reach_the_scene_and_what_follows_from_it():
     assert both[0].key != stiff[0].key
 
 
-@pytest.mark.parametrize("name", ["backend", "mesh", "permeability", "table-2"])
+def test_fixed_values_hold_in_every_case():
+    plan = load_study(TINY | {"fixed": {"stop.inflow_mass": 7.0}})
+    assert {case.scene.mpm.stop.inflow_mass for case in cases(plan)} == {7.0}
+    with pytest.raises(StudyError, match="must not vary"):
+        load_study(TINY | {"fixed": {"gate.angle": 7.0}})
+
+
+@pytest.mark.parametrize("name", ["backend", "mesh", "permeability", "sensitivity", "table-2"])
 def test_ready_studies_are_valid(name):
     assert name in study_names() and len(cases(load_study(name))) >= 5
 
@@ -157,6 +172,53 @@ def test_lost_workers_cost_only_their_case(tmp_path, monkeypatch):
     monkeypatch.setattr(execute, "run_case", made_up)
     serial = coupling.study(TINY, tmp_path / "serial", workers=0)
     xr.testing.assert_identical(data["bending_moment"].load(), serial["bending_moment"].load())
+
+
+def test_progress_of_all_cases_is_read_from_their_folders(tmp_path):
+    numbers = {"a": 0, "b": 1, "c": 2, "d": 3}
+    for key in numbers:
+        (tmp_path / key).mkdir()
+    (tmp_path / "a" / case_module.CASE_FILE).touch()
+    report = CaseProgress(tmp_path / "b")
+    report({"stage": "gush", "time": 1.0, "inflow_mass": 30.0, "share": 0.5})
+    state = study_state(tmp_path, numbers, {"c": "made to fail"})
+    assert (state.total, state.done, state.failed) == (4, 1, 1)
+    assert state.running == {1: {"stage": "gush", "time": 1.0, "inflow_mass": 30.0, "share": 0.5}}
+    assert state.share == pytest.approx(2.5 / 4)
+    os.utime(tmp_path / "b" / "progress.json", (0, 0))  # a worker that was lost long ago
+    assert study_state(tmp_path, numbers, {}).running == {}
+    report.end()
+    assert not list((tmp_path / "b").iterdir())
+
+
+def test_study_tells_how_far_it_is(fast, tmp_path):
+    states = []
+    coupling.study(TINY, tmp_path, workers=0, watch=states.append)
+    assert (states[-1].done, states[-1].failed, states[-1].share) == (3, 1, 1.0)
+
+
+def test_killed_case_is_continued_not_begun_anew(tmp_path, monkeypatch):
+    scene = small_scene(stop={"inflow_mass": 20.0, "time": 0.3}, output={"interval": 0.005, "snapshot_interval": None})
+    plain = tmp_path / "plain"
+    case_module.run_case(scene.source, str(plain), (), 3)
+
+    class Killed(BaseException):
+        """Stands for SIGKILL: nothing is tidied up after it."""
+
+    def report(self, state):
+        if state.get("share", 0.0) > 0.5:
+            raise Killed
+
+    monkeypatch.setattr(CaseProgress, "__call__", report)
+    monkeypatch.setattr("coupling.recorded_simulation.RecordedSimulation._close_if_possible", lambda *a, **k: None)
+    monkeypatch.setattr("mpm.simulation.SECONDS_BETWEEN_REPORTS", 0.0)
+    with pytest.raises(Killed):
+        case_module.run_case(scene.source, str(tmp_path / "killed"), (), 3)
+    monkeypatch.undo()
+    case_module.run_case(scene.source, str(tmp_path / "killed"), (), 3)
+    assert "continued from step" in (tmp_path / "killed" / "run" / "run.log").read_text()
+    both = [xr.open_dataset(place / case_module.CASE_FILE).load() for place in (plain, tmp_path / "killed")]
+    xr.testing.assert_identical(*(one.drop_vars("cpu_seconds") for one in both))
 
 
 def test_command_runs_a_study_file(fast, tmp_path):

@@ -22,7 +22,7 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int) 
     source : str
         TOML of the complete scene.
     folder : str
-        The case's own; made when absent. What a killed run left there is replaced.
+        The case's own; made when absent. What a killed run left there is continued where it can be.
     backends : tuple of str
         Lining models.
     records : int
@@ -41,9 +41,10 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int) 
 
     from coupling.datasets import read_history, read_pressures, write_response
     from coupling.provenance import root_attributes
-    from coupling.run import respond, run
-    from coupling.run_folder import RUN_FILE
+    from coupling.run import respond, respond_beside, run
+    from coupling.run_folder import RUN_FILE, RunRefused
     from coupling.scene import parse_scene
+    from coupling.studies.progress import CaseProgress
 
     place = Path(folder)
     done = place / CASE_FILE
@@ -52,7 +53,13 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int) 
     scene = parse_scene(source, str(place))
     place.mkdir(parents=True, exist_ok=True)
     run_folder = place / RUN_FOLDER
-    run(scene, run_folder, overwrite=True, threads=1)
+    report = CaseProgress(place)
+    try:
+        run(scene, run_folder, threads=1, resume=True, progress=report)
+    except RunRefused:
+        # nothing there yet, or what is there began with other versions or has failed
+        run(scene, run_folder, overwrite=True, threads=1, progress=report)
+    report({"stage": "respond"})
     pressures, history = read_pressures(run_folder), read_history(run_folder)
     if "tunnel" in pressures.dims:
         pressures = pressures.isel(tunnel=scene.mpm.gate.tunnel if scene.mpm.gate else 0, drop=True)
@@ -60,12 +67,14 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int) 
     for name in backends if scene.ring is not None else ():
         responses[name] = respond(scene, pressures, name)
         write_response(run_folder / RUN_FILE, responses[name], name)
+        respond_beside(scene, run_folder, name)
     last = scene.mpm.stop.inflow_mass or float(history["inflow_mass"].values[-1])
     result = at_inflow_masses(pressures, history, responses, np.linspace(0.0, last, records))
     result.attrs = root_attributes(scene)
     waiting = place / f"{CASE_FILE}.{os.getpid()}"
     result.to_netcdf(waiting, engine="h5netcdf")
     waiting.replace(done)
+    report.end()
     return str(done)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +44,8 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     for name in plan.parameters:
         values = np.array([case.parameters[name] for case in cases])
         result = result.assign_coords({name.replace(".", "_"): ("case", values, {"long_name": name})})
+    if "scene" in plan.parameters:
+        result = result.assign_coords(_of_scenes(cases))
     done = np.array([case in there for case in cases])
     result["status"] = ("case", np.where(done, "finished", "failed"))
     result["message"] = ("case", np.array([failures.get(case.key, "") for case in cases], dtype=str))
@@ -57,13 +60,27 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     return result
 
 
-def read_study(folder: str | Path):
-    """The dataset of a study that ran earlier.
+def _of_scenes(cases):
+    """Coordinates that tell scenes apart where the scene itself is a parameter."""
+    soils = [case.scene.mpm.soils[0] for case in cases]
+    tunnels = [case.scene.mpm.tunnels[:1] for case in cases]
+    gates = [case.scene.mpm.gate for case in cases]
+    columns = {
+        "gate_angle": ([np.nan if gate is None else gate.angle for gate in gates], "degree", "angle of the gate"),
+        "cover": ([t[0].cover if t else np.nan for t in tunnels], "m", "cover of the first tunnel"),
+        "soil": ([soil.name for soil in soils], "1", "uppermost soil"),
+        "cohesion": ([soil.cohesion for soil in soils], "Pa", "its cohesion"),
+        "friction_angle": ([soil.friction_angle for soil in soils], "degree", "its friction angle"),
+        "youngs_modulus": ([soil.youngs_modulus for soil in soils], "Pa", "its Young's modulus"),
+    }
+    return {
+        name: ("case", np.array(values), {"units": units, "long_name": text})
+        for name, (values, units, text) in columns.items()
+    }
 
-    Parameters
-    ----------
-    folder : str or path
-        As given to :func:`coupling.study`.
+
+def stored_cases(folder: str | Path) -> tuple[Study, list[Case], dict[str, str]]:
+    """Definition, cases and failures of a study that ran earlier, also by an earlier version of the program.
 
     Raises
     ------
@@ -81,5 +98,25 @@ def read_study(folder: str | Path):
     except ValueError as error:
         raise StudyError(f"study folder '{folder}': {STUDY_FILE} must be that of a study, got: {error}") from None
     status = json.loads((folder / STATUS_FILE).read_text(encoding="utf-8")) if (folder / STATUS_FILE).is_file() else {}
-    failures = {key: entry["message"] for key, entry in status.items() if entry["status"] == "failed"}
-    return collect(plan, cases(plan), folder, failures)
+    found = cases(plan)
+    # the keys that the cases had when they ran: the sources may have changed since
+    if [entry["parameters"] for entry in status.values()] == [case.parameters for case in found]:
+        found = [replace(case, key=key) for case, key in zip(found, status, strict=True)]
+    return plan, found, {key: entry["message"] for key, entry in status.items() if entry["status"] == "failed"}
+
+
+def read_study(folder: str | Path):
+    """The dataset of a study that ran earlier.
+
+    Parameters
+    ----------
+    folder : str or path
+        As given to :func:`coupling.study`.
+
+    Raises
+    ------
+    coupling.studies.design.StudyError
+        No study there.
+    """
+    plan, found, failures = stored_cases(folder)
+    return collect(plan, found, Path(folder), failures)

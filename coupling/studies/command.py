@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 
-def run_study(name, out, workers, scheduler, tell):
+def run_study(name, out, workers, scheduler, console):
     """Run a study, store its dataset as study.nc, and return what the command shows.
 
     Returns
@@ -18,10 +18,12 @@ def run_study(name, out, workers, scheduler, tell):
     """
     from coupling.studies.design import cases, load_study
     from coupling.studies.execute import DATA_FILE, study
+    from coupling.studies.progress import StudyLine
 
     plan = load_study(name)
     folder = Path(out) if out is not None else Path("studies") / plan.name
-    dataset = study(plan, folder, workers, scheduler, tell)
+    with StudyLine(console) as line:
+        dataset = study(plan, folder, workers, scheduler, console.print, line)
     waiting = folder / f"{DATA_FILE}.new"
     dataset.to_netcdf(waiting, engine="h5netcdf")
     waiting.replace(folder / DATA_FILE)

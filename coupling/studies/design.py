@@ -59,12 +59,15 @@ class Study(BaseModel):
     name : str
     scene : str
         Built-in scene or TOML file that every case starts from; a parameter named "scene" replaces it.
-    design : {"factorial", "list", "latin-hypercube", "sobol"}
+    design : {"factorial", "list", "one-at-a-time", "latin-hypercube", "sobol"}
         "factorial": all combinations of the listed values. "list": the first values of all lists, then the second,
-        and so on. The others sample ranges (scipy.stats.qmc).
+        and so on. "one-at-a-time": the scene as it is, then every listed value alone. The others sample ranges
+        (scipy.stats.qmc).
     parameters : dict
         Dotted name of a scene's key, as "gate.angle" or "soils.0.porosity", to a list of values (factorial, list) or to
         a table with low, high and scale (samples).
+    fixed : dict
+        Dotted names to values that all cases take instead of the scene's.
     samples : int, optional
         Number of cases of a sampled design; a power of two for "sobol".
     seed : int
@@ -79,8 +82,9 @@ class Study(BaseModel):
 
     name: str = Field(min_length=1, max_length=60, pattern=r"^\w[\w.-]*$")
     scene: str = "quick"
-    design: Literal["factorial", "list", "latin-hypercube", "sobol"] = "factorial"
+    design: Literal["factorial", "list", "one-at-a-time", "latin-hypercube", "sobol"] = "factorial"
     parameters: dict[str, tuple[Any, ...] | Range] = Field(min_length=1)
+    fixed: dict[str, Any] = {}
     samples: int | None = Field(default=None, ge=2, le=100_000)
     seed: int = 0
     backends: tuple[str, ...] = ("beam-spring",)
@@ -104,18 +108,23 @@ class Study(BaseModel):
                 f"samples: must be a power of two in a sobol design, got {self.samples};"
                 f" use {2 ** (self.samples.bit_length())}"
             )
+        twice = sorted(set(self.fixed) & {*self.parameters, "scene"})
+        if twice:
+            raise ValueError(f"fixed.{twice[0]}: must not vary or be the scene, got {self.fixed[twice[0]]!r}; drop it")
         lengths = {len(values) for values in self.parameters.values()} if self.design == "list" else {1}
         if len(lengths) > 1:
             raise ValueError(f"parameters: lists must be equally long in a list design, got lengths {sorted(lengths)}")
         return self
 
     def combinations(self) -> list[dict[str, Any]]:
-        """Value of every parameter in every case."""
+        """What every case changes in the scene, by dotted name: all parameters, or only one in "one-at-a-time"."""
         names = list(self.parameters)
         if self.design == "factorial":
             return [dict(zip(names, values, strict=True)) for values in itertools.product(*self.parameters.values())]
         if self.design == "list":
             return [dict(zip(names, values, strict=True)) for values in zip(*self.parameters.values(), strict=True)]
+        if self.design == "one-at-a-time":
+            return [{}, *({name: value} for name, values in self.parameters.items() for value in values)]
         from scipy.stats import qmc
 
         if self.design == "sobol":
@@ -193,14 +202,28 @@ def cases(study: Study) -> list[Case]:
         base = changes.pop("scene", study.scene)
         try:
             data = read_scene_data(base)
-            for name, value in changes.items():
+            for name, value in {**study.fixed, **changes}.items():
                 data = _changed(data, name.split("."), value, name)
             scene = make_scene(data, f"case {index}")
         except SceneError as problem:
             shown = ", ".join(f"{name} = {value}" for name, value in parameters.items())
             raise StudyError(f"study '{study.name}', case {index} ({shown}): {problem}") from None
-        result.append(Case(index, parameters, scene, _key(scene, study)))
+        known = {name: parameters.get(name, base if name == "scene" else None) for name in study.parameters}
+        if study.design == "one-at-a-time":
+            known = {
+                name: _value_in(scene, name) if name != "scene" and name not in parameters else value
+                for name, value in known.items()
+            }
+        result.append(Case(index, known, scene, _key(scene, study)))
     return result
+
+
+def _value_in(scene, name):
+    """Value of a complete scene at a dotted name."""
+    value = scene.mpm.model_dump() | {"ring": None if scene.ring is None else scene.ring.model_dump()}
+    for part in name.split("."):
+        value = value[int(part)] if isinstance(value, list | tuple) else value[part]
+    return value
 
 
 def _changed(data, path, value, name):

@@ -10,6 +10,7 @@ from typing import Any
 
 from coupling.studies.case import CASE_FILE, run_case
 from coupling.studies.design import Case, Study, StudyError, cases, load_study
+from coupling.studies.progress import StudyState, watching
 
 #: Times that a case may lose its worker, the last ones with nothing beside it.
 LOSSES = 3
@@ -22,6 +23,7 @@ def study(
     workers: int | None = None,
     scheduler: str | None = None,
     progress: Callable[[str], None] | None = None,
+    watch: Callable[[StudyState], None] | None = None,
 ):
     """Run a study and return its dataset.
 
@@ -40,6 +42,8 @@ def study(
         Address of a dask scheduler to use instead; its workers must see `out` under the same path.
     progress : callable, optional
         Called with one line of text whenever a case ends.
+    watch : callable, optional
+        Called every second, from a thread of its own, with a :class:`coupling.studies.progress.StudyState`.
 
     Returns
     -------
@@ -65,11 +69,13 @@ def study(
     missing = {case.key: case for case in todo if not case_file(folder, case).is_file()}
     tell(f"{plan.name}: {len(todo)} cases, {len(todo) - sum(c.key in missing for c in todo)} of them are there already")
     failures: dict[str, str] = {}
-    for count, (case, failure) in enumerate(_run(plan, list(missing.values()), folder, workers, scheduler), start=1):
-        if failure:
-            failures[case.key] = failure
-        outcome = f"failed: {failure}" if failure else "done"
-        tell(f"{count} of {len(missing)}: case {case.index} ({_shown(case)}) {outcome}")
+    with watching(folder / CASES, {case.key: case.index for case in todo}, failures, watch):
+        outcomes = _run(plan, list(missing.values()), folder, workers, scheduler)
+        for count, (case, failure) in enumerate(outcomes, start=1):
+            if failure:
+                failures[case.key] = failure
+            outcome = f"failed: {failure}" if failure else "done"
+            tell(f"{count} of {len(missing)}: case {case.index} ({_shown(case)}) {outcome}")
     status = {
         case.key: {"parameters": case.parameters, "status": "failed" if case.key in failures else "finished",
                    "message": failures.get(case.key, "")}

@@ -1,0 +1,107 @@
+"""A study on a dask scheduler with two worker processes, one of them killed in the middle, against a serial run.
+
+    uv run python benchmarks/lost_worker.py           # 64 coarse runs; a smaller power of two as an argument
+
+The study must end complete and equal to the serial one, bit for bit. Prints what happened as JSON.
+"""
+
+import argparse
+import json
+import os
+import signal
+import tempfile
+import time as clock
+from pathlib import Path
+
+import numpy as np
+
+import coupling
+from coupling.scene import load_scene
+
+COARSE = {
+    "element_size": 5.0,
+    "element_size_lining": 0.9,
+    "element_size_interior": 0.6,
+    "elements_across_gate": 2,
+    "gate_radius": 0.5,
+    "size_growth": 0.5,
+    "points_per_element_gate": 3,
+}
+#: Of every run: how far it differs from nothing but where and when it was computed.
+MEASURED = ("cpu_seconds", "status", "message")
+
+
+def plan(count):
+    """The study: runs of a few hundred steps on a mesh of some hundred elements."""
+    fixed = {f"discretisation.{name}": value for name, value in COARSE.items()}
+    fixed |= {"numerics.relaxation_tolerance": 1e-3, "stop.inflow_mass": 8.0, "stop.time": 0.1, "output.interval": 0.01}
+    fixed |= {"output.snapshot_interval": 1.0}
+    return {
+        "name": "lost-worker",
+        "scene": load_scene("quick").name,
+        "design": "sobol",
+        "samples": count,
+        "records": 5,
+        "fixed": fixed,
+        "parameters": {
+            "gate.angle": {"low": 30.0, "high": 150.0},
+            "soils.0.friction_angle": {"low": 22.0, "high": 38.0},
+        },
+    }
+
+
+def killed_study(count, folder):
+    """Run the study on a scheduler, kill a worker after a quarter of the cases; dataset, lines told, pid killed."""
+    import dask
+    from distributed import Client, LocalCluster
+
+    lines, killed = [], []
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 0}),
+        LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", memory_limit=0
+        ) as cluster,
+        Client(cluster) as client,
+    ):
+
+        def progress(line):
+            lines.append(line)
+            if " done" in line and len(lines) > max(count // 4, 1) and not killed:
+                worker = next(iter(client.run(os.getpid).values()))
+                os.kill(worker, signal.SIGKILL)
+                killed.append(worker)
+
+        data = coupling.study(plan(count), folder, scheduler=cluster.scheduler_address, progress=progress).load()
+    return data, lines, killed
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("count", type=int, nargs="?", default=64, help="number of runs, a power of two")
+    count = parser.parse_args().count
+    with tempfile.TemporaryDirectory() as place:
+        begin = clock.monotonic()
+        parallel, lines, killed = killed_study(count, Path(place) / "parallel")
+        between = clock.monotonic()
+        serial = coupling.study(plan(count), Path(place) / "serial", workers=0).load()
+        end = clock.monotonic()
+    different = [
+        name
+        for name in serial.data_vars
+        if name not in MEASURED and not np.array_equal(serial[name], parallel[name], equal_nan=True)
+    ]
+    result = {
+        "runs": count,
+        "workers_killed": len(killed),
+        "finished": int((parallel["status"] == "finished").sum()),
+        "told_done": sum(line.endswith("done") for line in lines),
+        "different_variables": different,
+        "parallel_seconds": between - begin,
+        "serial_seconds": end - between,
+    }
+    print(json.dumps(result, indent=1))
+    raise SystemExit(0 if not different and result["finished"] == count and killed else 1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,99 @@
+"""Points of a snapshot averaged in the elements of the mesh, and how much neighbouring elements differ."""
+
+import numpy as np
+
+from coupling.postprocess.geometry import gate_position
+
+
+def element_means(points, mesh, name):
+    """Volume-weighted mean of a variable of the points in every element; NaN where there is none.
+
+    Parameters
+    ----------
+    points : xarray.Dataset
+        One snapshot.
+    mesh : xarray.Dataset
+    name : str or (n_points,) array
+
+    Returns
+    -------
+    mean : (n_elements,) float64
+    volume : (n_elements,) float64
+        Volume of the material in the element [m2].
+    """
+    element = element_of_points(points, mesh)
+    values = points[name].values if isinstance(name, str) else name
+    inside = element >= 0
+    count = mesh.sizes["element"]
+    weight = points["volume"].values[inside]
+    volume = np.bincount(element[inside], weight, count)
+    with np.errstate(invalid="ignore"):
+        return np.bincount(element[inside], weight * values[inside], count) / np.where(
+            volume > 0, volume, np.nan
+        ), volume
+
+
+def element_of_points(points, mesh):
+    """Number of the element that holds each point, -1 for points outside of the mesh or padded."""
+    from matplotlib.tri import Triangulation
+
+    triangulation = Triangulation(mesh["x"].values, mesh["y"].values, mesh["element_nodes"].values)
+    x, y = points["x"].values, points["y"].values
+    valid = np.isfinite(x) & np.isfinite(y)
+    element = np.full(len(x), -1)
+    element[valid] = triangulation.get_trifinder()(x[valid], y[valid])
+    return element
+
+
+def pore_pressure_steps(points, mesh, nearest, furthest):
+    """How much the pore pressure of the ground jumps between neighbouring elements around the gate.
+
+    Parameters
+    ----------
+    points, mesh : xarray.Dataset
+        One snapshot and the mesh of a run.
+    nearest, furthest : float
+        Distance of the elements from the gate's middle on the outer face [m].
+
+    Returns
+    -------
+    dict
+        jump: |p1 - p2| over their mean, for every pair of neighbours; deviation: |p - p_fit| over p_fit, p_fit from a
+        plane through the elements around (those that share a node), so that a physical gradient does not count.
+        Each an array. A negative pore pressure counts as zero: it carries nothing.
+    """
+    mean, _ = element_means(points, mesh, np.maximum(points["pore_pressure"].values, 0.0))
+    centre = element_centres(mesh)
+    near = np.hypot(*(centre - gate_position(mesh)).T)
+    ground = (mesh["region"].values == 0) & np.isfinite(mean)
+    chosen = ground & (near >= nearest) & (near <= furthest)
+    nodes = mesh["element_nodes"].values
+    touching = {}
+    for e in np.flatnonzero(ground & (near <= furthest + 5)):
+        for node in nodes[e].tolist():
+            touching.setdefault(node, []).append(int(e))
+    jumps, deviations = [], []
+    for e in np.flatnonzero(chosen):
+        around = set().union(*(touching[n] for n in nodes[e].tolist())) - {int(e)}
+        for other in around:
+            if other > e and len(set(nodes[other]) & set(nodes[e])) == 2:
+                jumps.append(abs(mean[other] - mean[e]) / max(0.5 * (mean[other] + mean[e]), 1e-9))
+        if len(around) >= 5:
+            rows = np.array(sorted(around))
+            plane = np.column_stack([np.ones(len(rows)), centre[rows] - centre[e]])
+            fit = np.linalg.lstsq(plane, mean[rows], rcond=None)[0][0]
+            deviations.append(abs(mean[e] - fit) / max(abs(fit), 1e-9))
+    return {"jump": np.array(jumps), "deviation": np.array(deviations)}
+
+
+def element_centres(mesh):
+    """Centres of all elements, (n_elements, 2) float64 [m]."""
+    nodes = mesh["element_nodes"].values
+    return np.column_stack([mesh["x"].values[nodes].mean(1), mesh["y"].values[nodes].mean(1)])
+
+
+def element_areas(mesh):
+    """Areas of all elements, (n_elements,) float64 [m2]."""
+    nodes = mesh["element_nodes"].values
+    x, y = mesh["x"].values[nodes], mesh["y"].values[nodes]
+    return 0.5 * np.abs((x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0]))

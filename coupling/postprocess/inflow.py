@@ -1,0 +1,143 @@
+"""States of a run at equal inflow mass, what they are over the initial state, and how evenly material flows in."""
+
+import numpy as np
+
+
+def at_inflow(dataset, inflow_mass):
+    """State at an inflow mass, linear between the records around its first crossing.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        With `inflow_mass` (time) [kg/m]: pressures, history or response.
+    inflow_mass : float
+        [kg/m]
+
+    Returns
+    -------
+    xarray.Dataset
+        Without time dimension; `time` as a scalar coordinate.
+
+    Raises
+    ------
+    ValueError
+        When the run did not get there.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> run = xr.Dataset({"inflow_mass": ("time", [0.0, 40.0])}, coords={"time": [0.0, 2.0]})
+    >>> at_inflow(run, 10.0).time.item()
+    0.5
+    """
+    mass = dataset["inflow_mass"].values
+    reached = np.flatnonzero(mass >= inflow_mass)
+    if not reached.size:
+        raise ValueError(
+            f"inflow_mass: {inflow_mass:g} kg/m was not reached, the run ends at {mass[-1]:.4g} kg/m; ask for less"
+        )
+    after = int(reached[0])
+    if after == 0:
+        return dataset.isel(time=0)
+    share = (inflow_mass - mass[after - 1]) / (mass[after] - mass[after - 1])
+    time = dataset["time"].values
+    return dataset.interp(time=time[after - 1] + share * (time[after] - time[after - 1]), assume_sorted=True)
+
+
+def with_inflow(dataset, history):
+    """A dataset over time with the inflow mass of the history at its times, so that :func:`at_inflow` takes it.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        On times of its own, for instance of snapshots.
+    history : xarray.Dataset
+        With `inflow_mass` (time) [kg/m].
+    """
+    mass = np.interp(dataset["time"].values, history["time"].values, history["inflow_mass"].values)
+    return dataset.assign(inflow_mass=("time", mass, dict(history["inflow_mass"].attrs)))
+
+
+def pressure_ratio(pressures, name, inflow_mass):
+    """Pressure on the lining at an inflow mass over the initial one, at every angle.
+
+    Parameters
+    ----------
+    pressures : xarray.Dataset
+        With `inflow_mass` (time) [kg/m].
+    name : str
+        "soil_pressure" or "water_pressure".
+    inflow_mass : float
+        [kg/m]
+
+    Returns
+    -------
+    xarray.DataArray
+        (theta) [-]
+
+    Raises
+    ------
+    ValueError
+        When the run did not get there.
+    """
+    now = at_inflow(pressures[[name, "inflow_mass"]], inflow_mass)[name]
+    ratio = now / pressures[name].isel(time=0, drop=True)
+    about = pressures[name].attrs.get("long_name", name)
+    return ratio.rename(name).assign_attrs(units="1", long_name=f"{about}, over the initial one")
+
+
+def additional_at_inflow(response, inflow_mass):
+    """What the event has added to the ring's forces and displacements at an inflow mass.
+
+    Parameters
+    ----------
+    response : xarray.Dataset
+        Of a lining model, the initial state first, with `inflow_mass` (time) [kg/m].
+    inflow_mass : float
+        [kg/m]
+
+    Returns
+    -------
+    xarray.Dataset
+        Variables of :func:`structure.additional` without time.
+
+    Raises
+    ------
+    ValueError
+        When the run did not get there.
+    """
+    from structure import additional
+
+    return at_inflow(additional(response), inflow_mass)
+
+
+def ratio_to_initial(pressures, name, inflow_mass, angles):
+    """Mean of a pressure over some angles at an inflow mass, over the same mean of the initial state [-].
+
+    angles : sequence of float, degrees from the crown, clockwise; cells of the theta grid nearest to them.
+    """
+    field = pressures[name].sel(theta=np.asarray(angles, float) % 360, method="nearest").mean("theta")
+    now = at_inflow(field.to_dataset().assign(inflow_mass=pressures["inflow_mass"]), inflow_mass)[name]
+    return float(now) / float(field.isel(time=0))
+
+
+def inflow_linearity(history, first, last):
+    """Straight-line fit of inflow mass over time between two inflow masses [kg/m].
+
+    Returns
+    -------
+    rate : float
+        [kg/m/s]
+    r_squared : float
+        Coefficient of determination.
+    """
+    mass = history["inflow_mass"].values
+    inside = (mass >= first) & (mass <= last)
+    if inside.sum() < 3:
+        raise ValueError(
+            f"inflow_mass: only {inside.sum()} records between {first:g} and {last:g} kg/m; record more often"
+        )
+    time, mass = history["time"].values[inside], mass[inside]
+    slope, offset = np.polyfit(time, mass, 1)
+    left = mass - slope * time - offset
+    return float(slope), float(1 - left @ left / np.sum((mass - mass.mean()) ** 2))

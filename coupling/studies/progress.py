@@ -1,0 +1,155 @@
+"""How far a study is: each case writes its state into its folder, whoever shares the folder can read them all."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import threading
+import time as clock
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+PROGRESS_FILE = "progress.json"
+SECONDS_BETWEEN_STATES = 1.0
+#: A case that has not written for so long is taken for lost; the slowest stage between two states takes some seconds.
+SECONDS_UNTIL_LOST = 120.0
+
+
+class CaseProgress:
+    """Writes the state of one case, about once a second; callable with the progress dicts of :func:`coupling.run`.
+
+    Parameters
+    ----------
+    folder : path
+        Of the case.
+    """
+
+    def __init__(self, folder: Path):
+        self._path, self._last = Path(folder) / PROGRESS_FILE, -1e9
+
+    def __call__(self, state):
+        """Store one progress dict."""
+        now = clock.monotonic()
+        if state["stage"] == "gush" and now - self._last < SECONDS_BETWEEN_STATES:
+            return
+        self._last = now
+        kept = {name: state[name] for name in ("stage", "time", "inflow_mass", "share") if name in state}
+        waiting = self._path.with_suffix(f".{os.getpid()}")
+        with contextlib.suppress(OSError):  # a full disk stops the run itself, where it loses something
+            waiting.write_text(json.dumps(kept), encoding="utf-8")
+            waiting.replace(self._path)
+
+    def end(self):
+        """Take the state away: the case is done."""
+        self._path.unlink(missing_ok=True)
+
+
+@dataclass(frozen=True)
+class StudyState:
+    """The state of a whole study.
+
+    total, done, failed : number of cases;  running : number of the case to its last state (stage, time [s],
+    inflow_mass [kg/m], share [-]).
+    """
+
+    total: int
+    done: int
+    failed: int
+    running: dict[int, dict]
+
+    @property
+    def share(self):
+        """Share of the study that is behind it, every case counted alike [-]."""
+        begun = sum(min(state.get("share", 0.0), 1.0) for state in self.running.values())
+        return (self.done + self.failed + begun) / max(self.total, 1)
+
+
+def study_state(folder: Path, numbers: dict[str, int], failures: dict[str, str]) -> StudyState:
+    """Read the state of all cases from their folders.
+
+    Parameters
+    ----------
+    folder : path
+        That holds the cases' folders.
+    numbers : dict of str to int
+        Key of a case to its number.
+    failures : dict of str to str
+        Keys of those that have failed.
+    """
+    from coupling.studies.case import CASE_FILE
+
+    done, running = 0, {}
+    for key, number in numbers.items():
+        place = folder / key
+        if (place / CASE_FILE).is_file():
+            done += 1
+        elif key not in failures:
+            with contextlib.suppress(OSError, ValueError):
+                if clock.time() - (place / PROGRESS_FILE).stat().st_mtime < SECONDS_UNTIL_LOST:
+                    running[number] = json.loads((place / PROGRESS_FILE).read_text(encoding="utf-8"))
+    return StudyState(len(numbers), done, len(failures), running)
+
+
+@contextlib.contextmanager
+def watching(folder, numbers, failures, watch: Callable[[StudyState], None] | None):
+    """Tell `watch` the state of a study once a second while the block runs, and once at its end."""
+    if watch is None:
+        yield
+        return
+    ended = threading.Event()
+
+    def tell():
+        while not ended.wait(SECONDS_BETWEEN_STATES):
+            watch(study_state(folder, numbers, dict(failures)))
+
+    thread = threading.Thread(target=tell, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+        watch(study_state(folder, numbers, dict(failures)))
+
+
+class StudyLine:
+    """The live lines of a study, on a terminal only: the whole, and every case at work.
+
+    Parameters
+    ----------
+    console : rich.console.Console
+    """
+
+    def __init__(self, console):
+        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
+        self._bars = Progress(*columns, TimeRemainingColumn(), console=console, transient=True)
+        self._shown: dict[int, object] = {}
+        self._whole = self._bars.add_task("study", total=1.0)
+        self._live = console.is_terminal
+
+    def __enter__(self):
+        if self._live:
+            self._bars.start()
+        return self
+
+    def __exit__(self, *_):
+        if self._live:
+            self._bars.stop()
+
+    def __call__(self, state):
+        """Show one :class:`StudyState`."""
+        text = f"{state.done} of {state.total} cases" + (f", {state.failed} failed" if state.failed else "")
+        self._bars.update(self._whole, completed=state.share, description=text)
+        for number in set(self._shown) - set(state.running):
+            self._bars.remove_task(self._shown.pop(number))
+        for number, case in state.running.items():
+            if number not in self._shown:
+                self._shown[number] = self._bars.add_task("", total=1.0)
+            what = f"{case['inflow_mass']:.0f} kg/m" if case.get("stage") == "gush" else case.get("stage", "")
+            self._bars.update(
+                self._shown[number], completed=min(case.get("share", 0.0), 1.0), description=f"  case {number}: {what}"
+            )
