@@ -157,7 +157,8 @@ def judged(path, kind, whole, before_change=None):
     Returns
     -------
     str
-        "refused"; "same content"; "content before the change"; "another text" (a text, or a scene, that differs and is valid).
+        "refused"; "same content"; "content before the change"; "another text" (it
+        differs, and is valid).
 
     Raises
     ------
