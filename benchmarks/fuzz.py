@@ -128,13 +128,15 @@ def files(place, count, seed):
         target.parent.mkdir()
         if kind.endswith(".journal"):
             (target.parent / "run.nc").write_bytes(good["run.nc"].read_bytes())
+            before = reader(target)
+        else:
+            before = None
         target.write_bytes(good[kind].read_bytes())
         content, whole = good[kind].read_bytes(), reader(target)
-        # an incomplete journal belongs to a change that never began: then the file beside it counts
         for number in range(round(share * count)):
             target.write_bytes(damaged_files.damaged(random.Random(f"{seed} {kind} {number}"), content))
             try:
-                verdict = damaged_files.judged(target, kind, whole)
+                verdict = damaged_files.judged(target, kind, whole, before)
             except AssertionError as fault:
                 verdict = "fault"
                 faults.append(f"{kind} {number}: {str(fault)[-300:]}")

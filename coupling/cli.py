@@ -13,6 +13,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from coupling.events import EventStream
 from coupling.exit_codes import DIFFERENT, JsonPath, checked_json, failures, warn, write_json
 from coupling.measure_commands import accuracy_command, bench_command, stability_command, study_command
 from coupling.published.command import figures_command, published_command
@@ -68,14 +69,17 @@ def run_command(
     threads: Threads = None,
     no_figures: Annotated[bool, typer.Option("--no-figures", help="No ring response, no pictures.")] = False,
     json_path: JsonPath = None,
+    events: Annotated[
+        Path | None, typer.Option("--events", help="Also write what happens as JSON lines while it does; - prints.")
+    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print errors only.")] = False,
 ):
     """Open the gate of a scene and compute inflow, lining pressures and ring forces.
 
     JSON: keys of `coupling.summary.summarise_run`, and `run` (folder), `figures` (paths), `response` (keys of
-    `coupling.summary.summarise_response`, or null).
+    `coupling.summary.summarise_response`, or null). Events: see `coupling.events.EventStream`.
     """
-    with failures(), checked_json(json_path):
+    with failures(), checked_json(json_path), checked_json(events), EventStream(events) as stream:
         from coupling.datasets import RunFileError, read_response
         from coupling.quality import quality_line
         from coupling.run import run
@@ -86,8 +90,9 @@ def run_command(
         loaded = None if resume and scene is None else load_scene(scene or "quick")
         with ProgressLine(quiet) as line:
             pressures = run(
-                loaded, out, overwrite, line, threads, not no_figures, resume, checkpoint_interval, warn=warn
-            )
+                loaded, out, overwrite, stream.following(line), threads, not no_figures, resume, checkpoint_interval,
+                warn=stream.warning(warn),
+            )  # fmt: skip
         folder = Path(pressures.attrs["run"])
         data = {"run": str(folder), **summarise_run(folder), "response": None}
         with contextlib.suppress(RunFileError):
@@ -95,7 +100,8 @@ def run_command(
             data["quality"]["lining_equilibrium"] = data["response"]["equilibrium_residual"]
         data["figures"] = sorted(str(path) for path in (folder / FIGURES).glob("*.png"))
         write_json(json_path, data)
-        if not quiet and str(json_path) != "-":
+        stream.tell("result", **data)
+        if not quiet and str(json_path) != "-" and not stream.printing:
             console = Console()
             console.print(_run_table(data))
             if data["response"]:

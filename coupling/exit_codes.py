@@ -26,13 +26,13 @@ def failures():
         by = f" by {interrupt}" if str(interrupt) else ""
         complain("\n".join([f"interrupted{by}", *getattr(interrupt, "__notes__", ())]), INTERRUPTED)
     except (ValueError, RuntimeError, MemoryError, OSError) as error:
-        code = _exit_code(error)
+        code = exit_code(error)
         if code is None:
             raise
         complain("\n".join([str(error) or "not enough memory", *getattr(error, "__notes__", ())]), code)
 
 
-def _exit_code(error):
+def exit_code(error):
     """2 for refused input, 3 for a failed run, None for what is a mistake of the program."""
     from coupling.datasets import RunFileError
     from coupling.run_folder import RunRefused

@@ -112,7 +112,8 @@ def shown(path):
     """A path as people write it: soils[0].porosity."""
     text = ""
     for part in path:
-        text += f"[{part}]" if isinstance(part, int) else f"{'.' * bool(text)}{part}"
+        name = part if part != "" else '""'
+        text += f"[{part}]" if isinstance(part, int) else f"{'.' * bool(text)}{name}"
     return text
 
 

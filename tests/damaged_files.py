@@ -141,7 +141,7 @@ READERS = {
 TEXT = re.compile(r"@|^info$")
 
 
-def judged(path, kind, whole):
+def judged(path, kind, whole, before_change=None):
     """What becomes of a damaged file.
 
     Parameters
@@ -151,11 +151,14 @@ def judged(path, kind, whole):
         Of `READERS`.
     whole : dict
         What the reader gives for the undamaged file.
+    before_change : dict or None
+        What it gives without the journal: an incomplete one belongs to a change that never began.
 
     Returns
     -------
     str
-        "refused"; "same content"; "another text" (a text, or a scene, that differs and is valid).
+        "refused"; "same content"; "content before the change"; "another text" (it
+        differs, and is valid).
 
     Raises
     ------
@@ -175,6 +178,8 @@ def judged(path, kind, whole):
     other = [name for name in sorted(whole.keys() | answer.keys()) if not _equal(whole.get(name), answer.get(name))]
     if not other:
         return "same content"
+    if before_change is not None and all(_equal(before_change[name], answer.get(name)) for name in before_change):
+        return "content before the change"
     assert not guarded or all(TEXT.search(name) for name in other), f"{kind}: other content without a word: {other[:5]}"
     return "another text"
 

@@ -252,3 +252,55 @@ def test_progress_line_names_the_limit_and_the_time_left():
     text = line.text(state)
     for part in ("t 0.100 s", "inflow 50 kg/m", "dt 100 µs (acoustic)", "8.0 M point-steps/s", "30 s left"):
         assert part in text
+
+
+def events_of(text):
+    return [json.loads(line) for line in text.splitlines() if line.startswith("{")]
+
+
+def test_events_tell_stages_warnings_and_the_result_as_json_lines(simulated, tmp_path):
+    scene = tmp_path / "soft.toml"
+    scene.write_text('base = "quick"\nname = "soft"\n[gate]\nwidth = 0.002\n')
+    result = gush("run", scene, "--out", tmp_path / "a", "--no-figures", "--events", "-")
+    assert result.exit_code == 0, result.output
+    told = events_of(result.stdout)
+    assert len(told) == len(result.stdout.splitlines()), "nothing else is printed"
+    stages = [event["stage"] for event in told if event["event"] == "progress"]
+    assert stages[0] == "mesh" and "gush" in stages
+    (warned,) = [event for event in told if event["event"] == "warning"]
+    assert "gate.width" in warned["message"] and warned["message"] in (tmp_path / "a" / "run.log").read_text()
+    assert told[-1]["event"] == "result" and told[-1]["inflow_mass"] == 60.0
+
+
+def test_events_tell_how_a_run_failed(simulated, tmp_path):
+    for ending, name, code in (
+        (mpm.RunFailed("a material point became non-finite", 0.2, (1.0, -20.0)), "failed", 3),
+        (KeyboardInterrupt(), "interrupted", 130),
+    ):
+        simulated.ending = ending
+        file = tmp_path / f"{name}.jsonl"
+        assert gush("run", "quick", "--out", tmp_path / name, "--events", file).exit_code == code
+        last = events_of(file.read_text())[-1]
+        assert (last["event"], last["exit_code"]) == (name, code) and last["message"]
+    file = tmp_path / "refused.jsonl"
+    assert gush("run", "cas-3", "--events", file).exit_code == 2
+    assert events_of(file.read_text())[-1]["event"] == "refused"
+
+
+def test_quiet_run_prints_nothing_and_logs_all(simulated, tmp_path):
+    result = gush("run", "quick", "--out", tmp_path / "a", "--no-figures", "--quiet")
+    assert result.exit_code == 0 and result.output == ""
+    assert "finished in" in (tmp_path / "a" / "run.log").read_text()
+
+
+def test_progress_is_silent_where_there_is_no_terminal(capsys):
+    with ProgressLine() as line:
+        line({"stage": "mesh"})
+    assert capsys.readouterr() == ("", "")
+
+
+def test_text_of_unknown_origin_can_not_steer_the_terminal(tmp_path):
+    scene = tmp_path / "mine.toml"
+    scene.write_text('base = "quick"\n[gate]\n"\\u001b[2J" = 1\n')
+    result = gush("plan", scene)
+    assert result.exit_code == 2 and "\x1b[2J" not in result.output and "\\x1b[2J" in result.output
