@@ -189,6 +189,16 @@ def test_links_of_pages_outside_the_site_lead_somewhere(page):
     assert [link for link in links if "//" not in link and not (ROOT / link).exists()] == []
 
 
+@pytest.mark.parametrize("package", ["mpm", "structure", "coupling"])
+def test_every_public_name_is_in_the_reference(package):
+    page = (ROOT / f"docs/reference/{package}.md").read_text(encoding="utf-8")
+    shown = set(re.findall(r"^::: (\S+)$", page, re.MULTILINE)) | set(re.findall(r"members: \[(.*)\]", page))
+    for name in importlib.import_module(package).__all__:
+        public = getattr(importlib.import_module(package), name)
+        whole = public.__module__ in shown or any(name in members.split(", ") for members in shown)
+        assert whole or f"{public.__module__}.{name}" in shown, f"add {public.__module__}.{name} to docs/reference"
+
+
 def test_nothing_on_the_site_comes_from_a_network():
     config = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     assert "font: false" in config and "https://" not in config
