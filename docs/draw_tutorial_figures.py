@@ -13,6 +13,13 @@ from coupling.report.page import write_report
 
 FIGURES = ("fields", "pressures", "internal_forces")
 WIDTH, COLOURS = 1100, 128  # pixels, and colours enough for flat areas and lines
+#: The report shows its player alone, moved to the end.
+ONLY_PLAYER = """<style>main > section:not(#player) { display: none }</style>
+<script>addEventListener("load", () => {
+  const time = document.getElementById("time");
+  time.value = time.max;
+  time.dispatchEvent(new Event("input", {bubbles: true}));
+})</script>"""
 
 
 def shrink(source, target):
@@ -36,8 +43,10 @@ def main(target):
             sys.exit("report.png: needs chromium, found none; install it and draw again")
         shot = Path(folder) / "report.png"
         options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--virtual-time-budget=5000"]
-        page = write_report(run).absolute().as_uri()
-        subprocess.run([browser, *options, "--window-size=1200,1250", f"--screenshot={shot}", page], check=True)
+        page = write_report(run)
+        page.write_text(page.read_text(encoding="utf-8").replace("</body>", f"{ONLY_PLAYER}</body>"), encoding="utf-8")
+        options += ["--window-size=1200,1500", f"--screenshot={shot}"]
+        subprocess.run([browser, *options, page.absolute().as_uri()], check=True)
         shrink(shot, target / "report.png")
 
 

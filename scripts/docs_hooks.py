@@ -1,7 +1,8 @@
-"""What the docs site adds to Markdown: equations as MathML, help of the commands, reports that are not made yet."""
+"""What the docs site adds to Markdown: equations as MathML, help of the commands, examples, reports not made yet."""
 
 import html as markup
 import re
+from pathlib import Path
 
 import latex2mathml.converter
 from mkdocs.structure.files import File
@@ -30,10 +31,17 @@ def on_files(files, config):
 
 
 def on_page_markdown(markdown, page, **_):
-    """Put the help of every command on the page of commands."""
+    """Put the help of every command and the text of the examples on their pages."""
     if page.file.src_uri == "reference/commands.md":
         return markdown.replace("<!-- commands -->", commands())
+    if page.file.src_uri == "examples.md":
+        return re.sub("<!-- example (.*) -->", _example, markdown)
     return markdown
+
+
+def _example(match):
+    text = (Path(__file__).parent.parent / "examples" / match[1]).read_text(encoding="utf-8")
+    return f"```python\n{text}```"
 
 
 def on_page_content(html, **_):

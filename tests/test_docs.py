@@ -45,8 +45,6 @@ class Block:
         self.title, self.text, self.line = title[1] if title else "", token.content, token.map[0] + 2
         self.place = f"{page}:{self.line}"
         self.is_run = not NOT_RUN.fullmatch(self.title)
-        # the scripts of examples/, shown on a page of their own, run in test_examples.py
-        self.is_included = self.text.lstrip().startswith("--8<--")
 
 
 def blocks(page):
@@ -115,7 +113,7 @@ def follow(page):
     """Do in the current folder what a page says."""
     names = {"__name__": "__main__"}
     for block in blocks(page):
-        if block.language in SHOWN or block.is_included:
+        if block.language in SHOWN:
             continue
         if block.language == "bash":
             for words in command_lines(block.text):
@@ -178,6 +176,27 @@ def test_every_report_of_the_site_is_a_page_or_is_made_by_a_command_that_exists(
     assert len(commands) == 4
     for command in commands:
         parse(command.split(), "scripts/docs_hooks.py")
+
+
+def test_every_example_is_on_its_page():
+    shown = re.findall("<!-- example (.*) -->", (ROOT / "docs/examples.md").read_text(encoding="utf-8"))
+    assert sorted(shown) == sorted(path.name for path in (ROOT / "examples").glob("*.py"))
+
+
+@pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md"])
+def test_links_of_pages_outside_the_site_lead_somewhere(page):
+    links = re.findall(r"(?<!!)\[[^\]]*\]\(([^)#]+)\)", (ROOT / page).read_text(encoding="utf-8"))
+    assert [link for link in links if "//" not in link and not (ROOT / link).exists()] == []
+
+
+@pytest.mark.parametrize("package", ["mpm", "structure", "coupling"])
+def test_every_public_name_is_in_the_reference(package):
+    page = (ROOT / f"docs/reference/{package}.md").read_text(encoding="utf-8")
+    shown = set(re.findall(r"^::: (\S+)$", page, re.MULTILINE)) | set(re.findall(r"members: \[(.*)\]", page))
+    for name in importlib.import_module(package).__all__:
+        public = getattr(importlib.import_module(package), name)
+        whole = public.__module__ in shown or any(name in members.split(", ") for members in shown)
+        assert whole or f"{public.__module__}.{name}" in shown, f"add {public.__module__}.{name} to docs/reference"
 
 
 def test_nothing_on_the_site_comes_from_a_network():
