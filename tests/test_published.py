@@ -1,4 +1,4 @@
-"""The published study beside ours: rehearsed on very coarse meshes; its rules on states made up to pass or fail them."""
+"""The published study beside ours: a rehearsal on very coarse meshes; its rules on states made to pass or fail them."""
 
 import re
 
@@ -20,9 +20,9 @@ from structure.theory import theoretical_pressures
 
 FIXED = {f"discretisation.{name}": value for name, value in COARSE.items()} | {
     "numerics.relaxation_tolerance": 1e-3,
-    "stop.inflow_mass": 20.0,
+    "stop.inflow_mass": 40.0,
     "stop.time": 1.0,
-    "output.interval": 0.005,
+    "output.interval": 0.002,
     "output.snapshot_interval": 0.03,
 }
 

@@ -218,10 +218,13 @@ def twin_answers(twin: RunEvidence) -> list[Answer]:
 
 
 def mirror_answers(difference: dict[str, float]) -> list[Answer]:
-    """Our own check: case 3 with its gate at 270 degrees is the mirror image of case 3."""
+    """Our own check: case 3 with its gate at 270 degrees is the mirror image of case 3.
+
+    The mesher does not give the mirror image of a mesh; on one, runs agree to rounding (tests/test_gushing.py).
+    """
     return [
-        Answer(f"case 3 mirrored: {name.replace('_', ' ')}", "(ours)", f"{value:.1e}", abs(value) < 0.02,
-               "within 2 %: rounding differs and grains amplify it")
+        Answer(f"case 3 mirrored: {name.replace('_', ' ')}", "(ours)", f"{value:.1e}", abs(value) < 0.1,
+               "within 10 %: its mesh is another one, and meshes of one size scatter by 5 %")
         for name, value in difference.items()
     ]  # fmt: skip
 

@@ -122,13 +122,15 @@ def mirror_difference(pressures, mirrored, inflow_mass):
     Returns
     -------
     dict
-        soil_pressure, water_pressure: largest difference over the largest pressure [-]; time: relative difference of
-        the times at which the inflow mass was reached [-].
+        soil_pressure, water_pressure: largest difference of means over 21 degrees, over the largest pressure [-];
+        time: relative difference of the times at which the inflow mass was reached [-].
     """
     one, other = (postprocess.at_inflow(data, inflow_mass) for data in (pressures, mirrored))
     result = {}
     for name in ("soil_pressure", "water_pressure"):
         image = np.roll(other[name].values[::-1], 1)  # 0 stays where it is, 1 becomes 359
-        result[name] = float(np.abs(one[name].values - image).max() / np.abs(one[name].values).max())
+        difference = one[name].values - image
+        means = np.mean([np.roll(difference, shift) for shift in range(-10, 11)], axis=0)
+        result[name] = float(np.abs(means).max() / np.abs(one[name].values).max())
     result["time"] = float(other["time"]) / float(one["time"]) - 1
     return result

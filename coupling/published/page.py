@@ -101,7 +101,10 @@ def write_page(folder: str | Path, out: str | Path) -> dict:
     lines += _verdict([answer for rows in sections.values() for answer in rows if answer.published != "(ours)"])
     for title, rows in sections.items():
         lines += [f"## {title}", "", "| statement | published | here | agrees | rule |", "|---|---|---|---|---|"]
-        lines += [f"| {a.statement} | {a.published} | {a.ours} | {_word(a.agrees)} | {a.rule} |" for a in rows] + [""]
+        lines += [
+            _row(answer.statement, answer.published, answer.ours, _word(answer.agrees), answer.rule) for answer in rows
+        ]
+        lines.append("")
     lines += _cases_table(study, case.half, case.masses[-1])
     if sensitivity is not None:
         lines += sensitivity_section(sensitivity.load(), images)
@@ -141,12 +144,12 @@ def sensitivity_section(study, images: Path) -> list[str]:
         "",
         f"Coarse case 3 at {table['inflow_mass']:.0f} kg/m, one change at a time; the first row is the scene as it is.",
         "",
-        "| change | " + " | ".join(head) + " |",
+        _row("change", *head),
         "|---|" + "---|" * len(head),
     ]
     for row in table["rows"]:
         cells = [f"{row[name]:.4g}" if np.isfinite(row[name]) else "not reached" for name in names]
-        lines.append(f"| {row['change']} | " + " | ".join(cells) + " |")
+        lines.append(_row(row["change"], *cells))
     lines += ["", "![sensitivity](images/study/sensitivity.png)", ""]
     return lines
 
@@ -182,6 +185,11 @@ def _verdict(answers):
     wrong = [answer.statement for answer in judged if not answer.agrees]
     text = f"{len(judged) - len(wrong)} of {len(judged)} statements agree by their rule."
     return [text + (" Not: " + "; ".join(wrong) + "." if wrong else ""), ""]
+
+
+def _row(*cells):
+    """A row of a table; bars inside its cells, as of |Q|, are escaped."""
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
 def _largest(values):

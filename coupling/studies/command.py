@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ def run_study(name, out, workers, scheduler, console):
     plan = load_study(name)
     folder = Path(out) if out is not None else Path("studies") / plan.name
     with StudyLine(console) as line:
-        dataset = study(plan, folder, workers, scheduler, console.print, line)
+        dataset = study(plan, folder, workers, scheduler, partial(console.print, highlight=False, soft_wrap=True), line)
     waiting = folder / f"{DATA_FILE}.new"
     dataset.to_netcdf(waiting, engine="h5netcdf")
     waiting.replace(folder / DATA_FILE)

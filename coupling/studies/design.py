@@ -139,10 +139,14 @@ class Study(BaseModel):
 
 @dataclass(frozen=True)
 class Case:
-    """One scene of a study: its parameters, and a key that is the same whenever the same would be computed."""
+    """One scene of a study: its parameters, and a key that is the same whenever the same would be computed.
+
+    parameters : every parameter of the study;  changes : those that the design sets in this case.
+    """
 
     index: int
     parameters: dict[str, Any]
+    changes: dict[str, Any]
     scene: Scene
     key: str
 
@@ -214,7 +218,7 @@ def cases(study: Study) -> list[Case]:
                 name: _value_in(scene, name) if name != "scene" and name not in parameters else value
                 for name, value in known.items()
             }
-        result.append(Case(index, known, scene, _key(scene, study)))
+        result.append(Case(index, known, parameters, scene, _key(scene, study)))
     return result
 
 

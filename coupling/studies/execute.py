@@ -186,9 +186,12 @@ def _text(failure):
 
 
 def _shown(case: Case) -> str:
-    return ", ".join(
-        f"{name} = {value:g}" if isinstance(value, float) else f"{name} = {value}"
-        for name, value in case.parameters.items()
+    return (
+        ", ".join(
+            f"{name} = {value:g}" if isinstance(value, float) else f"{name} = {value}"
+            for name, value in case.changes.items()
+        )
+        or "as it is"
     )
 
 
