@@ -111,6 +111,7 @@ class Solver:
         self.initial_grain_mass = float(np.sum(self.points[:, MASS]))
         self.initial = self.sums_over_points()
         self._spare = self.start.copy(), self.order.copy()
+        self._left = np.zeros((PARTS, len(self.points)), np.int32)
         self._moved = np.zeros(len(self.points), np.int32), np.zeros(len(self.points), np.int32)
         self.longest_step, self.mode = math.inf, None  # spectral step [s] and its mode
         self._sort()
@@ -374,7 +375,7 @@ class Solver:
             self._water_density, self._water_modulus, self.levels.rows, self.geometry, self.nodes, self.rates,
             self.volume, self.levels.of_element, dt_of_level, self.ahead, advance, self.limit_speed,
             self.element_of_point,
-            per_range=(self.clamps, self.sums), up_to=up_to,
+            per_range=(self.clamps, self.sums, self._left), up_to=up_to,
         )  # fmt: skip
 
     def relax(self, progress=None):
@@ -462,12 +463,14 @@ class Solver:
         self.suspended = sum(o[2] for o in outcome)
         self.point_steps += int(self._points_up_to[finished])
         self.step_count += 1
-        if any(o[0] for o in outcome):
-            self._relocate(finished)
+        n_left = np.zeros(PARTS, np.int64)
+        n_left[: len(outcome)] = [o[0] for o in outcome]
+        if n_left.any():
+            self._relocate(n_left, finished)
 
-    def _relocate(self, finished):
+    def _relocate(self, n_left, finished):
         n_moved, removed, *limit = self._relocate_points(
-            self.element_of_point, self.points, self.soil_of_point, self.soils, self._water_density,
+            self._left, n_left, self.element_of_point, self.points, self.soil_of_point, self.soils, self._water_density,
             self.levels.rows, self.geometry, self.neighbours, self.nodes, self.limit_speed, self.volume,
             self.levels.of_element, finished, self.sums[0], self.clamps[0], *self._moved,
         )  # fmt: skip
@@ -475,12 +478,10 @@ class Solver:
         if removed:
             self.removed_mass = float(np.sum(self.points[self.element_of_point == -1, MASS]))
         if n_moved:
-            start, order = self._spare
             self.n_occupied, self.n_active = update_order(
-                self.element_of_point, *self._moved, n_moved, self.start, self.order, self.occupied, start, order
-            )
-            self._spare = self.start, self.order
-            self.start, self.order = start, order
+                self.element_of_point, *self._moved, n_moved, self.start, self.order, self.occupied, self.n_occupied,
+                *self._spare,
+            )  # fmt: skip
             self._cut()
 
     def _check(self, outcome):

@@ -274,7 +274,7 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
     def update_points(
         first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, bulk_liquid, rows,
         geometry, nodes, rates, volume, level_of_element, dt_of_level, ahead, advance, wave_speed, element_of_point,
-        clamps, sums,
+        clamps, sums, left,
     ):  # fmt: skip
         """Advance stress, pore pressure and porosity of the points of a range of elements, and map them to the nodes.
 
@@ -300,6 +300,8 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
             Written: -2 - element for a point that left its element.
         sums : (n_rows, 13) float64
             Added: masses, momenta, drag and forces of these elements.
+        left : (n_points,) int32
+            Written: the points that left their element.
 
         Returns
         -------
@@ -418,7 +420,8 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
                 n1 = g1x * dx + g1y * dy
                 n2 = g2x * dx + g2y * dy
                 if n1 < 0.0 or n2 < 0.0 or n1 + n2 > 1.0:
-                    element_of_point[i] = -2 - e  # left: to be searched from e
+                    element_of_point[i] = -2 - e  # to be searched from e
+                    left[moved] = i
                     moved += 1
                     continue
                 m = points[i, MASS]
