@@ -43,7 +43,7 @@ from mpm.variables import (
 
 PARTS = 2  # parts of the mesh that sum at the nodes on their own: fixed, so the bits do not depend on threads
 STEPS_BETWEEN_SORTS = 100
-STEPS_BETWEEN_SPECTRA = 2 * STEPS_BETWEEN_SORTS  # a spectrum costs about a dozen steps
+STEPS_BETWEEN_SPECTRA = 2 * STEPS_BETWEEN_SORTS  # a spectrum costs about half a dozen steps
 STEPS_BETWEEN_SPECTRA_OF_LEVELS = 25  # when a step is a dozen steps of the smallest elements
 ALMOST = 1.1  # a step shortened by less to meet an output time counts as limited by what limited it before
 # Of the spectral step over that of the altitude. Beyond, a few points resist nothing where they are: no estimate.
