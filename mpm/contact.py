@@ -26,6 +26,9 @@ from mpm.variables import (
     B_PSX,
     B_PSY,
     B_Q,
+    BUFFER_WIDTH,
+    NODAL_MEANS,
+    NODAL_MOMENTA,
     V_DLX,
     V_DLY,
     V_DSX,
@@ -447,11 +450,11 @@ def smooth_rates(first, last, which, means, momenta, sums, nodes):
             wl += means[part, i, 4]
             gx += means[part, i, 5]
             gy += means[part, i, 6]
-            for column in range(means.shape[2]):
+            for column in range(NODAL_MEANS):
                 means[part, i, column] = 0.0
-            for column in range(momenta.shape[2]):
+            for column in range(NODAL_MOMENTA):
                 momenta[part, i, column] = 0.0
-            for column in range(sums.shape[2]):
+            for column in range(BUFFER_WIDTH):
                 sums[part, i, column] = 0.0
         if volume > 0.0:
             nodes[i, V_TS] = ts / volume

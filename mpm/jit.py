@@ -15,12 +15,16 @@ import platformdirs
 # contract: fused multiply-add; nsz, arcp: harmless reordering. No "nnan" or "ninf": the
 # non-finite check of the solver relies on NaN keeping its meaning.
 FAST_MATH = {"contract", "nsz", "arcp"}
+# Vectors of what is alike and side by side: velocities of both phases, what a point adds to a node. numba leaves this
+# pass out by default; NUMBA_SLP_VECTORIZE in the environment decides where it is set.
+if "NUMBA_SLP_VECTORIZE" not in os.environ:
+    numba.config.SLP_VECTORIZE = 1
 OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": FAST_MATH, "cache": True}
 
 
 def kernel_cache_folder():
     """Return a writable folder for compiled kernels, keyed by the kernel sources [Path]."""
-    digest = hashlib.sha256(f"{numba.__version__} {sorted(FAST_MATH)}".encode())
+    digest = hashlib.sha256(f"{numba.__version__} {sorted(FAST_MATH)} {numba.config.SLP_VECTORIZE}".encode())
     for source in sorted(Path(__file__).parent.rglob("*.py")):
         digest.update(source.read_bytes())
     key = digest.hexdigest()[:16]

@@ -22,6 +22,7 @@ from mpm.variables import (
     MODEL_ELASTIC,
     MODEL_MOHR_COULOMB,
     NODAL_MEANS,
+    NODAL_MOMENTA,
     NODE_WIDTH,
     POINT_VARIABLES,
     RATE_WIDTH,
@@ -92,7 +93,7 @@ class Solver:
         self.order = np.zeros(len(self.points), np.int32)
         self.occupied = np.zeros(m, np.int32)
         self.sums = np.zeros((PARTS, n_rows, BUFFER_WIDTH))
-        self.momenta = np.zeros((PARTS, n_rows, 4))
+        self.momenta = np.zeros((PARTS, n_rows, NODAL_MOMENTA))
         self.nodal_means = np.zeros((PARTS, n_rows, NODAL_MEANS))
         self.nodes = np.zeros((n_rows, NODE_WIDTH))
         self.tied_means = np.zeros((n_rows - n, 6))

@@ -127,9 +127,10 @@ def advance_kernel(wet, tied):
             g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
             x0, y0 = geometry[e, 4], geometry[e, 5]
             a, b, c = rows[e, 0], rows[e, 1], rows[e, 2]
-            if tied:
+            border = tied and max(a, b, c) >= n_nodes
+            jx0 = jx1 = jx2 = jy0 = jy1 = jy2 = 0.0
+            if border:
                 # points move with the mean over all steps of a node, which ends with another velocity
-                jx0 = jx1 = jx2 = jy0 = jy1 = jy2 = 0.0
                 if a >= n_nodes:
                     jx0, jy0 = mean[a - n_nodes, 0] - nodes[a, V_SX], mean[a - n_nodes, 1] - nodes[a, V_SY]
                 if b >= n_nodes:
@@ -140,7 +141,6 @@ def advance_kernel(wet, tied):
             pic = 1.0 - flip_fraction
             for j in range(start[e], start[e + 1]):
                 i = order[j]
-                m = points[i, MASS]
                 dx = points[i, X] - x0
                 dy = points[i, Y] - y0
                 n1 = g1x * dx + g1y * dy
@@ -148,54 +148,51 @@ def advance_kernel(wet, tied):
                 n0 = 1.0 - n1 - n2
                 if tied and (n0 < 0.0 or n1 < 0.0 or n2 < 0.0):
                     n0, n1, n2 = on_element(n0, n1, n2)
+                m = points[i, MASS]
                 gx = n0 * nodes[a, V_SX] + n1 * nodes[b, V_SX] + n2 * nodes[c, V_SX]
                 gy = n0 * nodes[a, V_SY] + n1 * nodes[b, V_SY] + n2 * nodes[c, V_SY]
-                vx = (
-                    flip_fraction
-                    * (points[i, VSX] + n0 * nodes[a, V_DSX] + n1 * nodes[b, V_DSX] + n2 * nodes[c, V_DSX])
-                    + pic * gx
-                )
-                vy = (
-                    flip_fraction
-                    * (points[i, VSY] + n0 * nodes[a, V_DSY] + n1 * nodes[b, V_DSY] + n2 * nodes[c, V_DSY])
-                    + pic * gy
-                )
-                points[i, VSX], points[i, VSY] = vx, vy
-                if tied:
-                    gx += n0 * jx0 + n1 * jx1 + n2 * jx2
-                    gy += n0 * jy0 + n1 * jy1 + n2 * jy2
-                points[i, X] += dt * gx
-                points[i, Y] += dt * gy
-                sx0 += n0 * m * vx
-                sx1 += n1 * m * vx
-                sx2 += n2 * m * vx
-                sy0 += n0 * m * vy
-                sy1 += n1 * m * vy
-                sy2 += n2 * m * vy
+                vx = points[i, VSX] + n0 * nodes[a, V_DSX] + n1 * nodes[b, V_DSX] + n2 * nodes[c, V_DSX]
+                vy = points[i, VSY] + n0 * nodes[a, V_DSY] + n1 * nodes[b, V_DSY] + n2 * nodes[c, V_DSY]
+                vx = flip_fraction * vx + pic * gx
+                vy = flip_fraction * vy + pic * gy
                 if wet:
                     w = m / (soils[soil_of_point[i], S_RHO_S] * (1.0 - points[i, N])) * density_liquid
                     hx = n0 * nodes[a, V_LX] + n1 * nodes[b, V_LX] + n2 * nodes[c, V_LX]
                     hy = n0 * nodes[a, V_LY] + n1 * nodes[b, V_LY] + n2 * nodes[c, V_LY]
-                    ux = (
-                        flip_fraction
-                        * (points[i, VLX] + n0 * nodes[a, V_DLX] + n1 * nodes[b, V_DLX] + n2 * nodes[c, V_DLX])
-                        + pic * hx
-                    )
-                    uy = (
-                        flip_fraction
-                        * (points[i, VLY] + n0 * nodes[a, V_DLY] + n1 * nodes[b, V_DLY] + n2 * nodes[c, V_DLY])
-                        + pic * hy
-                    )
-                    points[i, VLX], points[i, VLY] = ux, uy
+                    ux = points[i, VLX] + n0 * nodes[a, V_DLX] + n1 * nodes[b, V_DLX] + n2 * nodes[c, V_DLX]
+                    uy = points[i, VLY] + n0 * nodes[a, V_DLY] + n1 * nodes[b, V_DLY] + n2 * nodes[c, V_DLY]
+                    ux = flip_fraction * ux + pic * hx
+                    uy = flip_fraction * uy + pic * hy
+                    smooth = max(n0 * nodes[a, V_P] + n1 * nodes[b, V_P] + n2 * nodes[c, V_P], 0.0)
+                    # the terms of each node in the order of its sums, so that they become vectors
+                    sx0 += n0 * (m * vx)
+                    sy0 += n0 * (m * vy)
+                    lx0 += n0 * (w * ux)
+                    ly0 += n0 * (w * uy)
+                    sx1 += n1 * (m * vx)
+                    sy1 += n1 * (m * vy)
+                    lx1 += n1 * (w * ux)
+                    ly1 += n1 * (w * uy)
+                    sx2 += n2 * (m * vx)
+                    sy2 += n2 * (m * vy)
+                    lx2 += n2 * (w * ux)
+                    ly2 += n2 * (w * uy)
+                    points[i, VSX], points[i, VSY], points[i, VLX], points[i, VLY] = vx, vy, ux, uy
                     if points[i, P] > 0.0:
-                        smooth = max(n0 * nodes[a, V_P] + n1 * nodes[b, V_P] + n2 * nodes[c, V_P], 0.0)
                         points[i, P] += pressure_filter * (smooth - points[i, P])
-                    lx0 += n0 * w * ux
-                    lx1 += n1 * w * ux
-                    lx2 += n2 * w * ux
-                    ly0 += n0 * w * uy
-                    ly1 += n1 * w * uy
-                    ly2 += n2 * w * uy
+                else:
+                    sx0 += n0 * (m * vx)
+                    sy0 += n0 * (m * vy)
+                    sx1 += n1 * (m * vx)
+                    sy1 += n1 * (m * vy)
+                    sx2 += n2 * (m * vx)
+                    sy2 += n2 * (m * vy)
+                    points[i, VSX], points[i, VSY] = vx, vy
+                if border:
+                    gx += n0 * jx0 + n1 * jx1 + n2 * jx2
+                    gy += n0 * jy0 + n1 * jy1 + n2 * jy2
+                points[i, X] += dt * gx
+                points[i, Y] += dt * gy
             sums[a, 0] += sx0
             sums[a, 1] += sy0
             if wet:
@@ -350,13 +347,15 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
             mean = ts * third
             equivalent = np.sqrt(2.0 * third * ((exx - mean) ** 2 + (eyy - mean) ** 2 + mean * mean + 2.0 * exy * exy))
             full = volume[e, 0] >= geometry[e, 6]
+            border = tied and ahead[e] > 0.0
+            cxx = cyy = cxy = cp = 0.0
             for j in range(start[e], start[e + 1]):
                 i = order[j]
                 s = soil_of_point[i]
                 dxx, dyy, dvol = exx, eyy, ts
                 if dilatant and soils[s, S_SIN_DIL] > 0.0:
                     dxx, dyy, dvol = dt * rates[e, R_XX], dt * rates[e, R_YY], own_s
-                if tied and ahead[e] > 0.0:
+                if border:
                     before = max(points[i, P], 0.0) if wet else 0.0
                     cxx, cyy, cxy, cp = points[i, SXX] - before, points[i, SYY] - before, points[i, SXY], before
                 if advance:
@@ -424,56 +423,65 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
                     left[moved] = i
                     moved += 1
                     continue
-                m = points[i, MASS]
-                n = points[i, N]
-                v = m / (soils[s, S_RHO_S] * (1.0 - n))
                 n0 = 1.0 - n1 - n2
-                ms0 += n0 * m
-                ms1 += n1 * m
-                ms2 += n2 * m
+                m, n = points[i, MASS], points[i, N]
+                v = m / (soils[s, S_RHO_S] * (1.0 - n))
                 vx, vy = points[i, VSX], points[i, VSY]
-                sx0 += n0 * m * vx
-                sx1 += n1 * m * vx
-                sx2 += n2 * m * vx
-                sy0 += n0 * m * vy
-                sy1 += n1 * m * vy
-                sy2 += n2 * m * vy
                 fastest = max(fastest, vx * vx + vy * vy)
                 p = 0.0
                 if wet:
-                    w = v * density_liquid
-                    w0, w1, w2 = n0 * w, n1 * w, n2 * w
-                    ml0 += w0
-                    ml1 += w1
-                    ml2 += w2
-                    mn0 += n * w0
-                    mn1 += n * w1
-                    mn2 += n * w2
-                    drag = n * soils[s, S_DRAG]
-                    d0 += drag * w0
-                    d1 += drag * w1
-                    d2 += drag * w2
-                    ux, uy = points[i, VLX], points[i, VLY]
-                    lx0 += w0 * ux
-                    lx1 += w1 * ux
-                    lx2 += w2 * ux
-                    ly0 += w0 * uy
-                    ly1 += w1 * uy
-                    ly2 += w2 * uy
-                    fastest = max(fastest, ux * ux + uy * uy)
-                    if points[i, P] > 0.0:
-                        p = points[i, P]
-                        pressed += v
+                    p = max(points[i, P], 0.0)
+                    pressed += v if p > 0.0 else 0.0
                     excess = v * (p - (n0 * p0 + n1 * p1 + n2 * p2))
-                    q0 += n0 * excess
-                    q1 += n1 * excess
-                    q2 += n2 * excess
                     fp += v * p
+                    w = v * density_liquid
+                    pore = n * w
+                    drag = pore * soils[s, S_DRAG]
+                    ux, uy = points[i, VLX], points[i, VLY]
+                    fastest = max(fastest, ux * ux + uy * uy)
+                    # the terms of each node in the order of its sums, so that they become vectors
+                    ms0 += n0 * m
+                    ml0 += n0 * w
+                    mn0 += n0 * pore
+                    d0 += n0 * drag
+                    sx0 += n0 * (m * vx)
+                    sy0 += n0 * (m * vy)
+                    lx0 += n0 * (w * ux)
+                    ly0 += n0 * (w * uy)
+                    q0 += n0 * excess
+                    ms1 += n1 * m
+                    ml1 += n1 * w
+                    mn1 += n1 * pore
+                    d1 += n1 * drag
+                    sx1 += n1 * (m * vx)
+                    sy1 += n1 * (m * vy)
+                    lx1 += n1 * (w * ux)
+                    ly1 += n1 * (w * uy)
+                    q1 += n1 * excess
+                    ms2 += n2 * m
+                    ml2 += n2 * w
+                    mn2 += n2 * pore
+                    d2 += n2 * drag
+                    sx2 += n2 * (m * vx)
+                    sy2 += n2 * (m * vy)
+                    lx2 += n2 * (w * ux)
+                    ly2 += n2 * (w * uy)
+                    q2 += n2 * excess
+                else:
+                    ms0 += n0 * m
+                    sx0 += n0 * (m * vx)
+                    sy0 += n0 * (m * vy)
+                    ms1 += n1 * m
+                    sx1 += n1 * (m * vx)
+                    sy1 += n1 * (m * vy)
+                    ms2 += n2 * m
+                    sx2 += n2 * (m * vx)
+                    sy2 += n2 * (m * vy)
                 fxx += v * (points[i, SXX] - p)
                 fyy += v * (points[i, SYY] - p)
                 fxy += v * points[i, SXY]
                 total += v
-                if tied and ahead[e] > 0.0:
+                if border:
                     w = ahead[e] * v
                     fxx += w * (points[i, SXX] - p - cxx)
                     fyy += w * (points[i, SYY] - p - cyy)
@@ -488,49 +496,65 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
                 limit = local
                 limit_speed = fastest
             g0x, g0y = -g1x - g2x, -g1y - g2y
-            sums[i0, B_MS] += ms0
-            sums[i0, B_PSX] += sx0
-            sums[i0, B_PSY] += sy0
-            sums[i0, B_FX] -= g0x * fxx + g0y * fxy
-            sums[i0, B_FY] -= g0x * fxy + g0y * fyy
-            sums[i1, B_MS] += ms1
-            sums[i1, B_PSX] += sx1
-            sums[i1, B_PSY] += sy1
-            sums[i1, B_FX] -= g1x * fxx + g1y * fxy
-            sums[i1, B_FY] -= g1x * fxy + g1y * fyy
-            sums[i2, B_MS] += ms2
-            sums[i2, B_PSX] += sx2
-            sums[i2, B_PSY] += sy2
-            sums[i2, B_FX] -= g2x * fxx + g2y * fxy
-            sums[i2, B_FY] -= g2x * fxy + g2y * fyy
             if wet:
                 # the smallest of the element's nodal shares of volume: a node that hardly touches it is not overdrawn
                 share = 3.0 * min(ml0, ml1, ml2) / (density_liquid * total) if total > 0.0 else 0.0
                 damped = PROJECTION_SMOOTHING * geometry[e, 7] ** 2 * share * pressed
+                sums[i0, B_MS] += ms0
                 sums[i0, B_ML] += ml0
                 sums[i0, B_MN] += mn0
                 sums[i0, B_D] += d0
-                sums[i0, B_Q] += q0 - damped * (g0x * px + g0y * py)
+                sums[i0, B_PSX] += sx0
+                sums[i0, B_PSY] += sy0
                 sums[i0, B_PLX] += lx0
                 sums[i0, B_PLY] += ly0
+                sums[i0, B_Q] += q0 - damped * (g0x * px + g0y * py)
+                sums[i0, B_FX] -= g0x * fxx + g0y * fxy
+                sums[i0, B_FY] -= g0x * fxy + g0y * fyy
                 sums[i0, B_FLX] += g0x * fp
                 sums[i0, B_FLY] += g0y * fp
+                sums[i1, B_MS] += ms1
                 sums[i1, B_ML] += ml1
                 sums[i1, B_MN] += mn1
                 sums[i1, B_D] += d1
-                sums[i1, B_Q] += q1 - damped * (g1x * px + g1y * py)
+                sums[i1, B_PSX] += sx1
+                sums[i1, B_PSY] += sy1
                 sums[i1, B_PLX] += lx1
                 sums[i1, B_PLY] += ly1
+                sums[i1, B_Q] += q1 - damped * (g1x * px + g1y * py)
+                sums[i1, B_FX] -= g1x * fxx + g1y * fxy
+                sums[i1, B_FY] -= g1x * fxy + g1y * fyy
                 sums[i1, B_FLX] += g1x * fp
                 sums[i1, B_FLY] += g1y * fp
+                sums[i2, B_MS] += ms2
                 sums[i2, B_ML] += ml2
                 sums[i2, B_MN] += mn2
                 sums[i2, B_D] += d2
-                sums[i2, B_Q] += q2 - damped * (g2x * px + g2y * py)
+                sums[i2, B_PSX] += sx2
+                sums[i2, B_PSY] += sy2
                 sums[i2, B_PLX] += lx2
                 sums[i2, B_PLY] += ly2
+                sums[i2, B_Q] += q2 - damped * (g2x * px + g2y * py)
+                sums[i2, B_FX] -= g2x * fxx + g2y * fxy
+                sums[i2, B_FY] -= g2x * fxy + g2y * fyy
                 sums[i2, B_FLX] += g2x * fp
                 sums[i2, B_FLY] += g2y * fp
+            else:
+                sums[i0, B_MS] += ms0
+                sums[i0, B_PSX] += sx0
+                sums[i0, B_PSY] += sy0
+                sums[i0, B_FX] -= g0x * fxx + g0y * fxy
+                sums[i0, B_FY] -= g0x * fxy + g0y * fyy
+                sums[i1, B_MS] += ms1
+                sums[i1, B_PSX] += sx1
+                sums[i1, B_PSY] += sy1
+                sums[i1, B_FX] -= g1x * fxx + g1y * fxy
+                sums[i1, B_FY] -= g1x * fxy + g1y * fyy
+                sums[i2, B_MS] += ms2
+                sums[i2, B_PSX] += sx2
+                sums[i2, B_PSY] += sy2
+                sums[i2, B_FX] -= g2x * fxx + g2y * fxy
+                sums[i2, B_FY] -= g2x * fxy + g2y * fyy
         clamps[C_SUSPENDED] += n_suspended
         clamps[C_CAVITATED] += n_cavitated
         clamps[C_FLOOR] += n_floor
