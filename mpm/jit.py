@@ -10,6 +10,7 @@ import tempfile
 from pathlib import Path
 
 import numba
+import numpy as np
 import platformdirs
 
 # contract: fused multiply-add; nsz, arcp: harmless reordering. No "nnan" or "ninf": the
@@ -47,3 +48,6 @@ elif not os.environ.get("NUMBA_CACHE_DIR"):
 
 kernel = numba.njit(**OPTIONS)
 inline_kernel = numba.njit(inline="always", **OPTIONS)
+
+# Of an index without sign numba knows that it does not count from the end: a tenth of a step is the test for that.
+index = np.uint64

@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 
-from mpm.jit import inline_kernel, kernel
+from mpm.jit import index, inline_kernel, kernel
 from mpm.materials.mohr_coulomb import mohr_coulomb
 from mpm.variables import (
     B_D,
@@ -119,14 +119,14 @@ def advance_kernel(wet, tied):
 
         Source: Sulsky, Zhou & Schreyer (1995) for MUSL; Zhu & Bridson (2005) for the PIC/FLIP blend.
         """
-        n_nodes = nodes.shape[0] - mean.shape[0]
+        n_nodes = index(nodes.shape[0] - mean.shape[0])
         for k in range(first, last):
-            e = occupied[k]
+            e = index(occupied[k])
             dt = dt_of_level[level_of_element[e]]
             flip_fraction = flip_of_level[level_of_element[e]]
             g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
             x0, y0 = geometry[e, 4], geometry[e, 5]
-            a, b, c = rows[e, 0], rows[e, 1], rows[e, 2]
+            a, b, c = index(rows[e, 0]), index(rows[e, 1]), index(rows[e, 2])
             border = tied and max(a, b, c) >= n_nodes
             jx0 = jx1 = jx2 = jy0 = jy1 = jy2 = 0.0
             if border:
@@ -140,7 +140,7 @@ def advance_kernel(wet, tied):
             sx0 = sx1 = sx2 = sy0 = sy1 = sy2 = lx0 = lx1 = lx2 = ly0 = ly1 = ly2 = 0.0
             pic = 1.0 - flip_fraction
             for j in range(start[e], start[e + 1]):
-                i = order[j]
+                i = index(order[j])
                 dx = points[i, X] - x0
                 dy = points[i, Y] - y0
                 n1 = g1x * dx + g1y * dy
@@ -156,7 +156,7 @@ def advance_kernel(wet, tied):
                 vx = flip_fraction * vx + pic * gx
                 vy = flip_fraction * vy + pic * gy
                 if wet:
-                    w = m / (soils[soil_of_point[i], S_RHO_S] * (1.0 - points[i, N])) * density_liquid
+                    w = m / (soils[index(soil_of_point[i]), S_RHO_S] * (1.0 - points[i, N])) * density_liquid
                     hx = n0 * nodes[a, V_LX] + n1 * nodes[b, V_LX] + n2 * nodes[c, V_LX]
                     hy = n0 * nodes[a, V_LY] + n1 * nodes[b, V_LY] + n2 * nodes[c, V_LY]
                     ux = points[i, VLX] + n0 * nodes[a, V_DLX] + n1 * nodes[b, V_DLX] + n2 * nodes[c, V_DLX]
@@ -226,9 +226,9 @@ def rates_kernel(wet):
             this times both divergences and times the gradient of the projected pore pressure.
         """
         for k in range(first, last):
-            e = occupied[k]
+            e = index(occupied[k])
             g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
-            a, b, c = rows[e, 0], rows[e, 1], rows[e, 2]
+            a, b, c = index(rows[e, 0]), index(rows[e, 1]), index(rows[e, 2])
             ux1, ux2 = nodes[b, V_SX] - nodes[a, V_SX], nodes[c, V_SX] - nodes[a, V_SX]
             uy1, uy2 = nodes[b, V_SY] - nodes[a, V_SY], nodes[c, V_SY] - nodes[a, V_SY]
             xx = g1x * ux1 + g2x * ux2
@@ -315,11 +315,11 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
         bad = -1
         third = 1.0 / 3.0
         for k in range(first, last):
-            e = occupied[k]
+            e = index(occupied[k])
             g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
             x0, y0 = geometry[e, 4], geometry[e, 5]
             dt = dt_of_level[level_of_element[e]]
-            i0, i1, i2 = rows[e, 0], rows[e, 1], rows[e, 2]
+            i0, i1, i2 = index(rows[e, 0]), index(rows[e, 1]), index(rows[e, 2])
             ms0 = ms1 = ms2 = ml0 = ml1 = ml2 = mn0 = mn1 = mn2 = d0 = d1 = d2 = q0 = q1 = q2 = 0.0
             sx0 = sx1 = sx2 = sy0 = sy1 = sy2 = lx0 = lx1 = lx2 = ly0 = ly1 = ly2 = 0.0
             fxx = fxy = fyy = fp = total = pressed = fastest = 0.0
@@ -350,8 +350,8 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
             border = tied and ahead[e] > 0.0
             cxx = cyy = cxy = cp = 0.0
             for j in range(start[e], start[e + 1]):
-                i = order[j]
-                s = soil_of_point[i]
+                i = index(order[j])
+                s = index(soil_of_point[i])
                 dxx, dyy, dvol = exx, eyy, ts
                 if dilatant and soils[s, S_SIN_DIL] > 0.0:
                     dxx, dyy, dvol = dt * rates[e, R_XX], dt * rates[e, R_YY], own_s
@@ -413,13 +413,13 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
                     checked = points[i, SXX] + points[i, P] + points[i, N]
                     checked += points[i, VSX] + points[i, VSY] + points[i, VLX] + points[i, VLY]
                     if bad < 0 and not np.isfinite(checked):
-                        bad = i
+                        bad = np.int64(i)
                 dx = points[i, X] - x0
                 dy = points[i, Y] - y0
                 n1 = g1x * dx + g1y * dy
                 n2 = g2x * dx + g2y * dy
                 if n1 < 0.0 or n2 < 0.0 or n1 + n2 > 1.0:
-                    element_of_point[i] = -2 - e  # to be searched from e
+                    element_of_point[i] = -2 - np.int64(e)  # to be searched from e
                     left[moved] = i
                     moved += 1
                     continue
