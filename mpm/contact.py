@@ -26,6 +26,9 @@ from mpm.variables import (
     B_PSX,
     B_PSY,
     B_Q,
+    BUFFER_WIDTH,
+    NODAL_MEANS,
+    NODAL_MOMENTA,
     V_DLX,
     V_DLY,
     V_DSX,
@@ -80,11 +83,11 @@ def stop_rows(i, next_row, nodes, mean):
     n_nodes = nodes.shape[0] - mean.shape[0]
     r = i
     while r >= 0:
-        row = nodes[r]
-        row[V_SX] = row[V_SY] = row[V_LX] = row[V_LY] = 0.0
-        row[V_DSX] = row[V_DSY] = row[V_DLX] = row[V_DLY] = 0.0
+        for column in range(V_SX, V_DLY + 1):
+            nodes[r, column] = 0.0
         if r >= n_nodes:
-            mean[r - n_nodes] = 0.0
+            for column in range(mean.shape[1]):
+                mean[r - n_nodes, column] = 0.0
         r = next_row[r]
 
 
@@ -135,20 +138,19 @@ def solve_nodes(
         while r >= 0:
             ml_row = q = 0.0
             for part in range(sums.shape[0]):
-                b = sums[part, r]
-                ms += b[B_MS]
-                ml_row += b[B_ML]
-                mn += b[B_MN]
-                dd += b[B_D]
-                psx += b[B_PSX]
-                psy += b[B_PSY]
-                plx += b[B_PLX]
-                ply += b[B_PLY]
-                q += b[B_Q]
-                fx += b[B_FX]
-                fy += b[B_FY]
-                flx += b[B_FLX]
-                fly += b[B_FLY]
+                ms += sums[part, r, B_MS]
+                ml_row += sums[part, r, B_ML]
+                mn += sums[part, r, B_MN]
+                dd += sums[part, r, B_D]
+                psx += sums[part, r, B_PSX]
+                psy += sums[part, r, B_PSY]
+                plx += sums[part, r, B_PLX]
+                ply += sums[part, r, B_PLY]
+                q += sums[part, r, B_Q]
+                fx += sums[part, r, B_FX]
+                fy += sums[part, r, B_FY]
+                flx += sums[part, r, B_FLX]
+                fly += sums[part, r, B_FLY]
             ml += ml_row
             if ml_row <= 0.0:
                 nodes[r, V_P] = 0.0
@@ -157,12 +159,11 @@ def solve_nodes(
             r = next_row[r]
         if fixed[i] & MIRROR_X:  # the mirror image's momentum is the opposite
             psx = plx = 0.0
-        row = nodes[i]
-        row[V_MS] = ms
-        row[V_ML] = ml
+        nodes[i, V_MS] = ms
+        nodes[i, V_ML] = ml
         status[i] = 0
         if ms <= 0.0 or ml <= 0.0:
-            row[V_MS] = 0.0
+            nodes[i, V_MS] = 0.0
             stop_rows(i, next_row, nodes, mean)
             continue
         grid_x, grid_y, water_x, water_y = fx, fy, flx, fly  # of stresses alone
@@ -224,29 +225,29 @@ def solve_nodes(
             vsx = vlx = 0.0
         if fixed[i] & FIXED_Y:
             vsy = vly = 0.0
-        row[V_SX], row[V_SY], row[V_LX], row[V_LY] = vsx, vsy, vlx, vly
-        row[V_DSX], row[V_DSY] = vsx - ux, vsy - uy
-        row[V_DLX], row[V_DLY] = vlx - wx, vly - wy
+        nodes[i, V_SX], nodes[i, V_SY], nodes[i, V_LX], nodes[i, V_LY] = vsx, vsy, vlx, vly
+        nodes[i, V_DSX], nodes[i, V_DSY] = vsx - ux, vsy - uy
+        nodes[i, V_DLX], nodes[i, V_DLY] = vlx - wx, vly - wy
         r = next_row[i]
         while r >= 0:
-            other, sofar = nodes[r], mean[r - n_nodes]
+            t = r - n_nodes
             if level_of_row[r] <= begun:
-                sofar[:] = 0.0
-                other[V_DSX] = other[V_DSY] = other[V_DLX] = other[V_DLY] = 0.0
+                for column in range(mean.shape[1]):
+                    mean[t, column] = 0.0
+                nodes[r, V_DSX] = nodes[r, V_DSY] = nodes[r, V_DLX] = nodes[r, V_DLY] = 0.0
             share = dt / dt_of_level[level_of_row[r]]
-            sofar[0] += share * vsx
-            sofar[1] += share * vsy
-            other[V_SX], other[V_SY], other[V_LX], other[V_LY] = vsx, vsy, vlx, vly
-            other[V_DSX] += vsx - ux
-            other[V_DSY] += vsy - uy
-            other[V_DLX] += vlx - wx
-            other[V_DLY] += vly - wy
+            mean[t, 0] += share * vsx
+            mean[t, 1] += share * vsy
+            nodes[r, V_SX], nodes[r, V_SY], nodes[r, V_LX], nodes[r, V_LY] = vsx, vsy, vlx, vly
+            nodes[r, V_DSX] += vsx - ux
+            nodes[r, V_DSY] += vsy - uy
+            nodes[r, V_DLX] += vlx - wx
+            nodes[r, V_DLY] += vly - wy
             for part in range(sums.shape[0]):
-                b = sums[part, r]
-                b[B_PSX] += b[B_MS] * (vsx - ux)
-                b[B_PSY] += b[B_MS] * (vsy - uy)
-                b[B_PLX] += b[B_ML] * (vlx - wx)
-                b[B_PLY] += b[B_ML] * (vly - wy)
+                sums[part, r, B_PSX] += sums[part, r, B_MS] * (vsx - ux)
+                sums[part, r, B_PSY] += sums[part, r, B_MS] * (vsy - uy)
+                sums[part, r, B_PLX] += sums[part, r, B_ML] * (vlx - wx)
+                sums[part, r, B_PLY] += sums[part, r, B_ML] * (vly - wy)
             r = next_row[r]
         # mean velocities of the step: with them work is the change of kinetic energy, whatever the time step
         sx, sy, lx, ly = 0.5 * (ux + vsx), 0.5 * (uy + vsy), 0.5 * (wx + vlx), 0.5 * (wy + vly)
@@ -283,20 +284,18 @@ def solve_dry_nodes(
         r = i
         while r >= 0:
             for part in range(sums.shape[0]):
-                b = sums[part, r]
-                ms += b[B_MS]
-                px += b[B_PSX]
-                py += b[B_PSY]
-                fx += b[B_FX]
-                fy += b[B_FY]
+                ms += sums[part, r, B_MS]
+                px += sums[part, r, B_PSX]
+                py += sums[part, r, B_PSY]
+                fx += sums[part, r, B_FX]
+                fy += sums[part, r, B_FY]
             r = next_row[r]
         if fixed[i] & MIRROR_X:
             px = 0.0
-        row = nodes[i]
-        row[V_MS] = ms
+        nodes[i, V_MS] = ms
         status[i] = 0
         if ms <= 0.0:
-            row[V_MS] = 0.0
+            nodes[i, V_MS] = 0.0
             stop_rows(i, next_row, nodes, mean)
             continue
         ux, uy = px / ms, py / ms
@@ -338,24 +337,24 @@ def solve_dry_nodes(
             vx = 0.0
         if fixed[i] & FIXED_Y:
             vy = 0.0
-        row[V_SX], row[V_SY] = vx, vy
-        row[V_DSX], row[V_DSY] = vx - ux, vy - uy
+        nodes[i, V_SX], nodes[i, V_SY] = vx, vy
+        nodes[i, V_DSX], nodes[i, V_DSY] = vx - ux, vy - uy
         r = next_row[i]
         while r >= 0:
-            other, sofar = nodes[r], mean[r - n_nodes]
+            t = r - n_nodes
             if level_of_row[r] <= begun:
-                sofar[:] = 0.0
-                other[V_DSX] = other[V_DSY] = 0.0
+                for column in range(mean.shape[1]):
+                    mean[t, column] = 0.0
+                nodes[r, V_DSX] = nodes[r, V_DSY] = 0.0
             share = dt / dt_of_level[level_of_row[r]]
-            sofar[0] += share * vx
-            sofar[1] += share * vy
-            other[V_SX], other[V_SY] = vx, vy
-            other[V_DSX] += vx - ux
-            other[V_DSY] += vy - uy
+            mean[t, 0] += share * vx
+            mean[t, 1] += share * vy
+            nodes[r, V_SX], nodes[r, V_SY] = vx, vy
+            nodes[r, V_DSX] += vx - ux
+            nodes[r, V_DSY] += vy - uy
             for part in range(sums.shape[0]):
-                b = sums[part, r]
-                b[B_PSX] += b[B_MS] * (vx - ux)
-                b[B_PSY] += b[B_MS] * (vy - uy)
+                sums[part, r, B_PSX] += sums[part, r, B_MS] * (vx - ux)
+                sums[part, r, B_PSY] += sums[part, r, B_MS] * (vy - uy)
             r = next_row[r]
         sx, sy = 0.5 * (ux + vx), 0.5 * (uy + vy)
         sum_x += ms * (vx - ux)
@@ -389,8 +388,7 @@ def remap_kernel(wet):
         n_nodes = nodes.shape[0] - mean.shape[0]
         for k in range(first, last):
             i = which[k]
-            row = nodes[i]
-            if row[V_MS] <= 0.0:
+            if nodes[i, V_MS] <= 0.0:
                 continue
             sx = sy = lx = ly = 0.0
             r = i
@@ -410,11 +408,11 @@ def remap_kernel(wet):
                             lx += sums[part, r, B_PLX]
                             ly += sums[part, r, B_PLY]
                 r = next_row[r]
-            sx /= row[V_MS]
-            sy /= row[V_MS]
+            sx /= nodes[i, V_MS]
+            sy /= nodes[i, V_MS]
             if wet:
-                lx /= row[V_ML]
-                ly /= row[V_ML]
+                lx /= nodes[i, V_ML]
+                ly /= nodes[i, V_ML]
             c = contact_of_node[i]
             if c >= 0 and active[c]:
                 nx, ny = normal[c, 0], normal[c, 1]
@@ -444,19 +442,20 @@ def remap_kernel(wet):
                 sx = lx = 0.0
             if fixed[i] & FIXED_Y:
                 sy = ly = 0.0
-            row[V_SX], row[V_SY] = sx, sy
+            nodes[i, V_SX], nodes[i, V_SY] = sx, sy
             if wet:
-                row[V_LX], row[V_LY] = lx, ly
+                nodes[i, V_LX], nodes[i, V_LY] = lx, ly
             r = next_row[i]
             while r >= 0:
-                other, sofar = nodes[r], mean[r - n_nodes]
+                t = r - n_nodes
                 share = dt_of_level[level_of_row[i]] / dt_of_level[level_of_row[r]]
-                sofar[2] += share * sx
-                sofar[3] += share * sy
-                sofar[4] += share * lx
-                sofar[5] += share * ly
+                mean[t, 2] += share * sx
+                mean[t, 3] += share * sy
+                mean[t, 4] += share * lx
+                mean[t, 5] += share * ly
                 if level_of_row[r] <= finished:
-                    other[V_SX], other[V_SY], other[V_LX], other[V_LY] = sofar[2], sofar[3], sofar[4], sofar[5]
+                    nodes[r, V_SX], nodes[r, V_SY] = mean[t, 2], mean[t, 3]
+                    nodes[r, V_LX], nodes[r, V_LY] = mean[t, 4], mean[t, 5]
                 r = next_row[r]
 
     return remap_nodes
@@ -477,17 +476,19 @@ def smooth_rates(first, last, which, means, momenta, sums, nodes):
         i = which[k]
         volume = ts = wet = ws = wl = gx = gy = 0.0
         for part in range(means.shape[0]):
-            row = means[part, i]
-            volume += row[0]
-            ts += row[1]
-            wet += row[2]
-            ws += row[3]
-            wl += row[4]
-            gx += row[5]
-            gy += row[6]
-            row[:] = 0.0
-            momenta[part, i] = 0.0
-            sums[part, i] = 0.0
+            volume += means[part, i, 0]
+            ts += means[part, i, 1]
+            wet += means[part, i, 2]
+            ws += means[part, i, 3]
+            wl += means[part, i, 4]
+            gx += means[part, i, 5]
+            gy += means[part, i, 6]
+            for column in range(NODAL_MEANS):
+                means[part, i, column] = 0.0
+            for column in range(NODAL_MOMENTA):
+                momenta[part, i, column] = 0.0
+            for column in range(BUFFER_WIDTH):
+                sums[part, i, column] = 0.0
         if volume > 0.0:
             nodes[i, V_TS] = ts / volume
         if wet > 0.0:

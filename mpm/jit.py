@@ -1,14 +1,21 @@
 """The kernel decorator: one place for numba's options."""
 
+import os
+
 import numba
+import numpy as np
 
 from mpm.kernel_cache import KernelCache, kernel_folder, variant_name
 
 # contract: fused multiply-add; nsz, arcp: harmless reordering. No "nnan" or "ninf": the
 # non-finite check of the solver relies on NaN keeping its meaning.
 FAST_MATH = {"contract", "nsz", "arcp"}
+# Vectors of what is alike and side by side: velocities of both phases, what a point adds to a node. numba leaves this
+# pass out by default; NUMBA_SLP_VECTORIZE in the environment decides where it is set.
+if "NUMBA_SLP_VECTORIZE" not in os.environ:
+    numba.config.SLP_VECTORIZE = 1
 OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": FAST_MATH}
-FOLDER = kernel_folder({**OPTIONS, "fastmath": sorted(FAST_MATH)})
+FOLDER = kernel_folder({**OPTIONS, "fastmath": sorted(FAST_MATH), "slp_vectorize": bool(numba.config.SLP_VECTORIZE)})
 
 
 def kernel(function, **options):
@@ -23,3 +30,7 @@ def kernel(function, **options):
 def inline_kernel(function):
     """A kernel that is written out where others call it."""
     return kernel(function, inline="always")
+
+
+# Of an index without sign numba knows that it does not count from the end: a tenth of a step is the test for that.
+index = np.uint64

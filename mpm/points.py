@@ -199,30 +199,23 @@ def cut_by_points(start, occupied, n_occupied, element_cuts, parts, smallest):
 
 
 @kernel
-def update_order(element_of_point, moved_point, moved_from, n_moved, start, order, occupied, new_start, new_order):
-    """Repair the sorting by element after a few points have moved, copying what lies between them.
+def update_order(
+    element_of_point, moved_point, moved_from, n_moved, start, order, occupied, n_occupied, new_start, new_order
+):
+    """Repair the sorting by element in place after a few points have moved, copying what lies between their elements.
 
     Equal to `sort_by_element` to the last entry, at the cost of a copy.
 
     moved_point, moved_from : (n,) int32
         The first n_moved entries: points, ascending, and the elements that they have left.
     new_start, new_order
-        Written; `occupied` as well. Returns the number of occupied elements and of points.
+        As `start` and `order`, for what is being sorted.
+    Returns the number of occupied elements and of points.
     """
     n_elements = start.size - 1
-    for e in range(n_elements + 1):
-        new_start[e] = 0
-    for k in range(n_moved):
-        new_start[moved_from[k] + 1] -= 1
-        e = element_of_point[moved_point[k]]
-        if e >= 0:
-            new_start[e + 1] += 1
-    filled = 0
-    shift = 0
-    read = 0  # everything of `order` before this entry is already copied or dropped
-    write = 0
     touched = np.zeros(2 * n_moved, np.int32)
     n_touched = 0
+    gone = 0
     for k in range(n_moved):
         touched[n_touched] = moved_from[k]
         n_touched += 1
@@ -230,12 +223,24 @@ def update_order(element_of_point, moved_point, moved_from, n_moved, start, orde
         if e >= 0:
             touched[n_touched] = e
             n_touched += 1
-    touched[:n_touched].sort()
+        else:
+            gone += 1
+    touched = touched[:n_touched]
+    touched.sort()
+    # elements outside of these keep their points where they are, unless some are gone
+    lowest, highest = touched[0], n_elements if gone > 0 else touched[-1] + 1
+    for e in range(lowest, highest):
+        new_start[e + 1] = start[e + 1] - start[e]
+    for k in range(n_moved):
+        new_start[moved_from[k] + 1] -= 1
+        e = element_of_point[moved_point[k]]
+        if e >= 0:
+            new_start[e + 1] += 1
     arriving = np.argsort(element_of_point[moved_point[:n_moved]], kind="mergesort")
+    read = write = start[lowest]  # everything of `order` between them is already copied or dropped
     a = 0
     last = -1
-    for k in range(n_touched):
-        e = touched[k]
+    for e in touched:
         if e == last:
             continue
         last = e
@@ -260,16 +265,30 @@ def update_order(element_of_point, moved_point, moved_from, n_moved, start, orde
                     read += 1  # it left and came back within the search
                 new_order[write] = i
                 write += 1
-    for j in range(read, start[n_elements]):
+    for j in range(read, start[highest]):
         new_order[write] = order[j]
         write += 1
-    for e in range(n_elements):
-        shift += new_start[e + 1]
-        new_start[e + 1] = start[e + 1] + shift
-        if new_start[e + 1] > new_start[e]:
-            occupied[filled] = e
+    held = occupied[:n_occupied]
+    first, after = np.searchsorted(held, lowest), np.searchsorted(held, highest)
+    filled = 0
+    for e in range(lowest, highest):
+        if new_start[e + 1] > 0:
             filled += 1
-    return filled, write
+    change = first + filled - after
+    if change > 0:
+        for k in range(n_occupied - 1, after - 1, -1):
+            occupied[k + change] = occupied[k]
+    elif change < 0:
+        for k in range(after, n_occupied):
+            occupied[k + change] = occupied[k]
+    for j in range(start[lowest], write):
+        order[j] = new_order[j]
+    for e in range(lowest, highest):
+        if new_start[e + 1] > 0:
+            occupied[first] = e
+            first += 1
+        start[e + 1] = start[e] + new_start[e + 1]
+    return n_occupied + change, start[n_elements]
 
 
 @cache
@@ -279,16 +298,19 @@ def relocate_kernel(wet, tied):
 
     @kernel
     def relocate(
-        element_of_point, points, soil_of_point, soils, density_liquid, rows, geometry, neighbours, nodes,
-        wave_speed, volume, level_of_element, finished, sums, clamps, moved_point, moved_from,
+        left, n_left, element_of_point, points, soil_of_point, soils, density_liquid, rows, geometry, neighbours,
+        nodes, wave_speed, volume, level_of_element, finished, sums, clamps, moved_point, moved_from,
     ):  # fmt: skip
         """Find the new element of every point that left its own, walking over neighbours, and map it there.
 
         A point that would cross the boundary of the mesh is put back on it (and counted); one that
         crosses an outflow edge (neighbour -2) is taken out: element -1. A point on its way to an element of a
-        level above `finished`, whose step is not over, waits in its own as if on the edge. The points that changed
-        their element and the elements that they left are written to `moved_point`, `moved_from` in ascending
-        order of points.
+        level above `finished`, whose step is not over, waits in its own as if on the edge.
+
+        left, n_left : (n_parts, n_points) int32, (n_parts,) int64
+            Points that left their element, of `update_points`, and how many.
+        moved_point, moved_from : (n_points,) int32
+            Written: the points that changed their element, ascending, and the elements that they left.
 
         Returns
         -------
@@ -301,11 +323,16 @@ def relocate_kernel(wet, tied):
         limit_speed = 0.0
         removed = 0
         n_moved = 0
-        for i in range(element_of_point.size):
-            if element_of_point[i] > -2:
-                continue
+        found = 0
+        for part in range(left.shape[0]):
+            for k in range(n_left[part]):
+                moved_point[found] = left[part, k]
+                found += 1
+        moved_point[:found].sort()
+        for k in range(found):
+            i = moved_point[k]
             e = -2 - element_of_point[i]
-            left = e
+            origin = e
             for _ in range(10000):
                 g = geometry[e]
                 dx = points[i, X] - g[4]
@@ -325,10 +352,10 @@ def relocate_kernel(wet, tied):
                 if following < 0:
                     # try to leave through the other violated edge first
                     other = -1
-                    for k in range(3):
-                        value = n0 if k == 0 else (n1 if k == 1 else n2)
-                        if k != worst and value < 0.0 and neighbours[e, k] >= 0:
-                            other = neighbours[e, k]
+                    for corner in range(3):
+                        value = n0 if corner == 0 else (n1 if corner == 1 else n2)
+                        if corner != worst and value < 0.0 and neighbours[e, corner] >= 0:
+                            other = neighbours[e, corner]
                     if other >= 0:
                         following = other
                 if following >= 0:
@@ -348,11 +375,11 @@ def relocate_kernel(wet, tied):
                 clamps[C_RETURNED] += 1
                 break
             if tied and e >= 0 and level_of_element[e] > finished:
-                e = left
+                e = origin
             element_of_point[i] = e
-            if e != left:
+            if e != origin:
                 moved_point[n_moved] = i
-                moved_from[n_moved] = left
+                moved_from[n_moved] = origin
                 n_moved += 1
             if e >= 0:
                 added, fastest = map_point(

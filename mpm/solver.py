@@ -23,6 +23,7 @@ from mpm.variables import (
     MODEL_ELASTIC,
     MODEL_MOHR_COULOMB,
     NODAL_MEANS,
+    NODAL_MOMENTA,
     NODE_WIDTH,
     POINT_VARIABLES,
     RATE_WIDTH,
@@ -46,8 +47,8 @@ from mpm.wall import MovingLinings
 
 PARTS = 2  # parts of the mesh that sum at the nodes on their own: fixed, so the bits do not depend on threads
 STEPS_BETWEEN_SORTS = 100
-# Long steps between spectra, each of which costs about a dozen: soon again where the critical step has fallen, as when
-# points have left the places they began in.
+# Long steps between spectra, each of which costs about half a dozen: soon again where the critical step has fallen, as
+# when points have left the places they began in.
 FEWEST_BETWEEN_SPECTRA, MOST_BETWEEN_SPECTRA, MOST_BETWEEN_SPECTRA_OF_LEVELS = 5, 200, 50
 ALMOST = 1.1  # a step shortened by less to meet an output time counts as limited by what limited it before
 # Of the spectral step over that of the altitude. Beyond, a few points resist nothing where they are: no estimate.
@@ -103,7 +104,7 @@ class Solver:
         self.order = np.zeros(len(self.points), np.int32)
         self.occupied = np.zeros(m, np.int32)
         self.sums = np.zeros((PARTS, n_rows, BUFFER_WIDTH))
-        self.momenta = np.zeros((PARTS, n_rows, 4))
+        self.momenta = np.zeros((PARTS, n_rows, NODAL_MOMENTA))
         self.nodal_means = np.zeros((PARTS, n_rows, NODAL_MEANS))
         self.nodes = np.zeros((n_rows, NODE_WIDTH))
         self.tied_means = np.zeros((n_rows - n, 6))
@@ -122,6 +123,7 @@ class Solver:
         self.initial_grain_mass = float(np.sum(self.points[:, MASS]))
         self.initial = self.sums_over_points()
         self._spare = self.start.copy(), self.order.copy()
+        self._left = np.zeros((PARTS, len(self.points)), np.int32)
         self._moved = np.zeros(len(self.points), np.int32), np.zeros(len(self.points), np.int32)
         self.longest_step, self.mode = math.inf, None  # spectral step [s] and its mode
         self.estimate_interval, self.next_estimate = STEPS_BETWEEN_SORTS, 0  # long steps between estimates of the step
@@ -419,7 +421,7 @@ class Solver:
             self._water_density, self._water_modulus, self.levels.rows, self.geometry, self.nodes, self.rates,
             self.volume, self.levels.of_element, dt_of_level, self.ahead, advance, self.limit_speed,
             self.element_of_point,
-            per_range=(self.clamps, self.sums), up_to=up_to,
+            per_range=(self.clamps, self.sums, self._left), up_to=up_to,
         )  # fmt: skip
 
     def relax(self, progress=None):
@@ -505,12 +507,14 @@ class Solver:
         self.suspended = sum(o[2] for o in outcome)
         self.point_steps += int(self._points_up_to[finished])
         self.step_count += 1
-        if any(o[0] for o in outcome):
-            self._relocate(finished)
+        n_left = np.zeros(PARTS, np.int64)
+        n_left[: len(outcome)] = [o[0] for o in outcome]
+        if n_left.any():
+            self._relocate(n_left, finished)
 
-    def _relocate(self, finished):
+    def _relocate(self, n_left, finished):
         n_moved, removed, *limit = self._relocate_points(
-            self.element_of_point, self.points, self.soil_of_point, self.soils, self._water_density,
+            self._left, n_left, self.element_of_point, self.points, self.soil_of_point, self.soils, self._water_density,
             self.levels.rows, self.geometry, self.neighbours, self.nodes, self.limit_speed, self.volume,
             self.levels.of_element, finished, self.sums[0], self.clamps[0], *self._moved,
         )  # fmt: skip
@@ -518,12 +522,10 @@ class Solver:
         if removed:
             self.removed_mass = float(np.sum(self.points[self.element_of_point == -1, MASS]))
         if n_moved:
-            start, order = self._spare
             self.n_occupied, self.n_active = update_order(
-                self.element_of_point, *self._moved, n_moved, self.start, self.order, self.occupied, start, order
-            )
-            self._spare = self.start, self.order
-            self.start, self.order = start, order
+                self.element_of_point, *self._moved, n_moved, self.start, self.order, self.occupied, self.n_occupied,
+                *self._spare,
+            )  # fmt: skip
             self._cut()
 
     def _check(self, outcome):

@@ -22,11 +22,176 @@ import math
 import numpy as np
 
 from mpm.contact import FIXED_X, FIXED_Y, free_pair
+from mpm.jit import kernel
 from mpm.variables import MASS, S_DRAG, S_G, S_LAMBDA, S_RHO_S, S_SIN_DIL, N, X, Y
 
 SAFETY = 0.9  # Ritz values come from below, and points move until the next estimate
 TOLERANCE = 1e-2  # of the largest eigenvalue
+KRYLOV = 10  # vectors: from a wrong mode within 0.4 % of the step that many more give
 ROUNDS = 3  # of the step that the drag depends on, from below, at the first call
+
+# What an element sums over its points: volume, the share that takes its own rates, moduli and water's stiffness times
+# volume, and the upper triangles of the consistent masses of grains and of water, row by row.
+(E_V, E_OWN, E_LAMBDA, E_G, E_QS, E_QL) = range(6)
+E_GRAINS, E_WATER, ELEMENT_WIDTH = 6, 12, 18
+
+
+@kernel
+def sum_points(
+    occupied, start, order, points, soil_of_point, soils, density_liquid, bulk_liquid, elements, rows, geometry,
+    stiffened, held, nodal, row_volume,
+):  # fmt: skip
+    """Sum the points in their elements and at the nodes.
+
+    stiffened : (n_elements,) float64
+        Factor of the stiffness of an element.
+    held : (n_occupied, 18) float64
+        Written: see the columns `E_`.
+    nodal : (n_nodes, 4) float64
+        Added: masses of grains, of water as if it filled all, of pore water [kg/m]; drag [kg/m/s].
+    row_volume : (n_rows,) float64
+        Added: volume of the elements around [m2].
+    """
+    for k in range(occupied.size):
+        e = occupied[k]
+        held[k] = 0.0
+        for j in range(start[e], start[e + 1]):
+            i = order[j]
+            s = soil_of_point[i]
+            dx, dy = points[i, X] - geometry[e, 4], points[i, Y] - geometry[e, 5]
+            n1, n2 = geometry[e, 0] * dx + geometry[e, 1] * dy, geometry[e, 2] * dx + geometry[e, 3] * dy
+            weight = (1.0 - n1 - n2, n1, n2)
+            mass, n = points[i, MASS], points[i, N]
+            volume = mass / (soils[s, S_RHO_S] * (1.0 - n))
+            water = volume * density_liquid
+            stiff = volume * stiffened[e]
+            held[k, E_V] += volume
+            if soils[s, S_SIN_DIL] > 0.0:
+                held[k, E_OWN] += volume
+            held[k, E_LAMBDA] += stiff * soils[s, S_LAMBDA]
+            held[k, E_G] += stiff * soils[s, S_G]
+            held[k, E_QS] += stiff * bulk_liquid * (1.0 - n) / n
+            held[k, E_QL] += stiff * bulk_liquid
+            column = 0
+            for a in range(3):
+                for b in range(a, 3):
+                    held[k, E_GRAINS + column] += mass * weight[a] * weight[b]
+                    held[k, E_WATER + column] += water * weight[a] * weight[b]
+                    column += 1
+                c = elements[e, a]
+                nodal[c, 0] += weight[a] * mass
+                nodal[c, 1] += weight[a] * water
+                nodal[c, 2] += weight[a] * n * water
+                nodal[c, 3] += weight[a] * n * water * soils[s, S_DRAG]
+        held[k, E_OWN] /= held[k, E_V]
+        for a in range(3):
+            row_volume[rows[e, a]] += held[k, E_V]
+
+
+@kernel
+def sum_divergences(occupied, elements, rows, geometry, held, velocity, divergence):
+    """Add the divergences of both phases, times the volume in an element, to its rows: (n_rows, 2) float64."""
+    wet = velocity.shape[1] == 4
+    for k in range(occupied.size):
+        e = occupied[k]
+        a, b, c = elements[e, 0], elements[e, 1], elements[e, 2]
+        for phase in range(2 if wet else 1):
+            x, y = 2 * phase, 2 * phase + 1
+            rate = geometry[e, 0] * (velocity[b, x] - velocity[a, x]) + geometry[e, 2] * (
+                velocity[c, x] - velocity[a, x]
+            )
+            rate += geometry[e, 1] * (velocity[b, y] - velocity[a, y]) + geometry[e, 3] * (
+                velocity[c, y] - velocity[a, y]
+            )
+            for corner in range(3):
+                divergence[rows[e, corner], phase] += held[k, E_V] * rate
+
+
+@kernel
+def sum_forces(occupied, elements, rows, geometry, held, velocity, smoothing, divergence, force):
+    """Add the forces of the stresses that `velocity` builds in a second to the nodes.
+
+    divergence : (n_rows, 2) float64
+        Means at the rows; used where `smoothing`.
+    force : (n_nodes, 4) float64
+        Of the mixture, and of the pore pressure on the water.
+    """
+    wet = velocity.shape[1] == 4
+    third = 1.0 / 3.0
+    for k in range(occupied.size):
+        e = occupied[k]
+        a, b, c = elements[e, 0], elements[e, 1], elements[e, 2]
+        g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
+        ux1, ux2 = velocity[b, 0] - velocity[a, 0], velocity[c, 0] - velocity[a, 0]
+        uy1, uy2 = velocity[b, 1] - velocity[a, 1], velocity[c, 1] - velocity[a, 1]
+        xx, yy = g1x * ux1 + g2x * ux2, g1y * uy1 + g2y * uy2
+        xy = 0.5 * (g1y * ux1 + g2y * ux2 + g1x * uy1 + g2x * uy2)
+        own = volume = xx + yy
+        liquid = 0.0
+        if wet:
+            liquid = g1x * (velocity[b, 2] - velocity[a, 2]) + g2x * (velocity[c, 2] - velocity[a, 2])
+            liquid += g1y * (velocity[b, 3] - velocity[a, 3]) + g2y * (velocity[c, 3] - velocity[a, 3])
+        if smoothing:
+            r, s, t = rows[e, 0], rows[e, 1], rows[e, 2]
+            volume = third * (divergence[r, 0] + divergence[s, 0] + divergence[t, 0])
+            liquid = third * (divergence[r, 1] + divergence[s, 1] + divergence[t, 1])
+        skeleton = volume + held[k, E_OWN] * (own - volume)
+        correction = 0.5 * (skeleton - own)
+        pressure = -(held[k, E_QS] * volume + held[k, E_QL] * liquid) if wet else 0.0
+        sxx = held[k, E_LAMBDA] * skeleton + 2.0 * held[k, E_G] * (xx + correction) - pressure
+        syy = held[k, E_LAMBDA] * skeleton + 2.0 * held[k, E_G] * (yy + correction) - pressure
+        sxy = 2.0 * held[k, E_G] * xy
+        for corner in range(3):
+            if corner == 0:
+                i, gx, gy = a, -g1x - g2x, -g1y - g2y
+            elif corner == 1:
+                i, gx, gy = b, g1x, g1y
+            else:
+                i, gx, gy = c, g2x, g2y
+            force[i, 0] -= gx * sxx + gy * sxy
+            force[i, 1] -= gx * sxy + gy * syy
+            force[i, 2] += gx * pressure
+            force[i, 3] += gy * pressure
+
+
+@kernel
+def accelerate_nodes(force, nodal, drag_time, free, acceleration):
+    """Accelerations of both phases from the forces at the nodes; those that are not free keep theirs at zero.
+
+    drag_time : (n_nodes,) float64
+        Time over which the implicit drag acts [s].
+    """
+    wet = acceleration.shape[1] == 4
+    for i in range(len(force)):
+        for axis in range(2):
+            if free[i, axis] and wet:
+                acceleration[i, axis], acceleration[i, axis + 2] = free_pair(
+                    force[i, axis],
+                    force[i, axis + 2],
+                    nodal[i, 0],
+                    nodal[i, 1],
+                    nodal[i, 2],
+                    drag_time[i] * nodal[i, 3],
+                )
+            elif free[i, axis]:
+                acceleration[i, axis] = force[i, axis] / nodal[i, 0]
+
+
+@kernel
+def through_points(occupied, elements, held, nodal, free, velocity, returned):
+    """From nodal velocities to the points and back: consistent over lumped mass. `returned` is added to, from zero."""
+    for k in range(occupied.size):
+        e = occupied[k]
+        a, b, c = elements[e, 0], elements[e, 1], elements[e, 2]
+        for x in range(velocity.shape[1]):
+            m = E_GRAINS if x < 2 else E_WATER
+            u, v, w = velocity[a, x], velocity[b, x], velocity[c, x]
+            returned[a, x] += held[k, m] * u + held[k, m + 1] * v + held[k, m + 2] * w
+            returned[b, x] += held[k, m + 1] * u + held[k, m + 3] * v + held[k, m + 4] * w
+            returned[c, x] += held[k, m + 2] * u + held[k, m + 4] * v + held[k, m + 5] * w
+    for i in range(len(returned)):
+        for x in range(velocity.shape[1]):
+            returned[i, x] = returned[i, x] / nodal[i, x // 2] if free[i, x % 2] else 0.0
 
 
 class Spectrum:
@@ -39,119 +204,45 @@ class Spectrum:
     """
 
     def __init__(self, solver):
-        from scipy.sparse import csr_array
-
-        mesh, scene = solver.mesh, solver.scene
-        inside = solver.element_of_point >= 0
-        points, element = solver.points[inside], solver.element_of_point[inside]
-        soil = solver.soils[solver.soil_of_point[inside]]
-        used = np.unique(element)
-        corners, geometry, levels = mesh.elements[used], solver.geometry[used], solver.levels
-        self.step_of_node = 2.0 ** levels.of_row[: len(mesh.nodes)]
-        element = np.searchsorted(used, element)
-        n_nodes, n_elements = len(mesh.nodes), len(used)
-        g = geometry[element]
-        dx, dy = points[:, X] - g[:, 4], points[:, Y] - g[:, 5]
-        n1, n2 = g[:, 0] * dx + g[:, 1] * dy, g[:, 2] * dx + g[:, 3] * dy
-        weights = np.column_stack([1 - n1 - n2, n1, n2])
-        row, column = np.repeat(np.arange(n_elements), 3), corners.ravel()
-        gx = np.column_stack([-geometry[:, 0] - geometry[:, 2], geometry[:, 0], geometry[:, 2]]).ravel()
-        gy = np.column_stack([-geometry[:, 1] - geometry[:, 3], geometry[:, 1], geometry[:, 3]]).ravel()
-        self.gx, self.gy = (csr_array((v, (row, column)), (n_elements, n_nodes)) for v in (gx, gy))
-        porosity, mass = points[:, N], points[:, MASS]
-        volume = mass / (soil[:, S_RHO_S] * (1 - porosity))
-
-        def total(values):
-            return np.bincount(element, values, n_elements)
-
-        def at_nodes(values):
-            sums = [np.bincount(corners[element, i], values * weights[:, i], n_nodes) for i in range(3)]
-            return sums[0] + sums[1] + sums[2]
-
-        def consistent_mass(mass):
-            data = np.empty((n_elements, 3, 3))
-            for i in range(3):
-                for j in range(i, 3):
-                    data[:, i, j] = data[:, j, i] = total(mass * weights[:, i] * weights[:, j])
-            rows, columns = np.repeat(corners, 3, axis=1), np.tile(corners, (1, 3))
-            return csr_array((data.ravel(), (rows.ravel(), columns.ravel())), (n_nodes, n_nodes))
-
-        ahead = levels.ahead(2.0 ** np.arange(levels.count))[used]
-        stiffened = volume * (4.0 ** levels.of_element[used] * (1 + 2 * ahead))[element]
-        own = volume * (soil[:, S_SIN_DIL] > 0.0)
-        self.own = np.divide(total(own), total(volume))  # share that takes its element's own rates
-        self.lam, self.shear = total(stiffened * soil[:, S_LAMBDA]), total(stiffened * soil[:, S_G])
-        self.wet = scene.water is not None
-        self.through_solid, self.mass_solid = self._through(consistent_mass(mass))
-        if self.wet:
-            water = volume * solver._water_density
-            self.q_solid = total(stiffened * solver._water_modulus * (1 - porosity) / porosity)
-            self.q_liquid = total(stiffened * solver._water_modulus)
-            self.through_liquid, self.mass_liquid = self._through(consistent_mass(water))
-            self.mass_pore = at_nodes(porosity * water)
-            self.drag = at_nodes(porosity * soil[:, S_DRAG] * water)
-        self.smoothing = scene.numerics.volumetric_smoothing
-        if self.smoothing:
-            rows = levels.rows[used].ravel()
-            self.to_nodes = csr_array((np.ones(3 * n_elements), (rows, row)), (len(levels.of_row), n_elements))
-            self.volume = total(volume)
-            sums = self.to_nodes @ self.volume
-            self.per_volume = np.divide(1.0, sums, out=np.zeros_like(sums), where=sums > 0)
-        self.free_x = (self.mass_solid > 0) & ((solver.fixed & FIXED_X) == 0)
-        self.free_y = (self.mass_solid > 0) & ((solver.fixed & FIXED_Y) == 0)
+        mesh, levels = solver.mesh, solver.levels
+        n_nodes = len(mesh.nodes)
+        self.wet = solver.scene.water is not None
+        self.smoothing = solver.scene.numerics.volumetric_smoothing
+        self.step_of_node = 2.0 ** levels.of_row[:n_nodes]
+        occupied = solver.occupied[: solver.n_occupied]
+        self.layout = occupied, mesh.elements, levels.rows, solver.geometry
+        self.held = np.empty((len(occupied), ELEMENT_WIDTH))
+        self.nodal = np.zeros((n_nodes, 4))
+        row_volume = np.zeros(len(levels.of_row))
+        ahead = levels.ahead(2 ** np.arange(levels.count))
+        sum_points(
+            occupied, solver.start, solver.order, solver.points, solver.soil_of_point, solver.soils,
+            solver._water_density, solver._water_modulus, mesh.elements, levels.rows, solver.geometry,
+            4.0**levels.of_element * (1 + 2 * ahead), self.held, self.nodal, row_volume,
+        )  # fmt: skip
+        self.per_volume = np.divide(1.0, row_volume, out=np.zeros_like(row_volume), where=row_volume > 0)[:, None]
+        fixed = solver.fixed[:, None] & np.array([FIXED_X, FIXED_Y], np.int8)
+        self.free = (self.nodal[:, :1] > 0) & (fixed == 0)
 
     def accelerations(self, velocity, dt):
-        """Nodal accelerations [1/s2 times velocity]: (4 or 2, n_nodes); dt [s] is that of the implicit drag."""
-        solid = velocity[:2]
-        xx, yy = self.gx @ solid[0], self.gy @ solid[1]
-        xy = 0.5 * (self.gy @ solid[0] + self.gx @ solid[1])
-        own = xx + yy
-        volume = self._mean(own)
-        skeleton = volume + self.own * (own - volume)
-        correction = 0.5 * (skeleton - own)
-        sxx = self.lam * skeleton + 2 * self.shear * (xx + correction)
-        syy = self.lam * skeleton + 2 * self.shear * (yy + correction)
-        sxy = 2 * self.shear * xy
-        if self.wet:
-            liquid = self._mean(self.gx @ velocity[2] + self.gy @ velocity[3])
-            pressure = -(self.q_solid * volume + self.q_liquid * liquid)
-            sxx, syy = sxx - pressure, syy - pressure
-        force = -(self.gx.T @ sxx + self.gy.T @ sxy), -(self.gx.T @ sxy + self.gy.T @ syy)
-        result = np.zeros_like(velocity)
-        drag = self.drag * self.step_of_node if self.wet else None
-        for k, (free, gradient) in enumerate(((self.free_x, self.gx), (self.free_y, self.gy))):
-            if self.wet:
-                ms, ml, mn = self.mass_solid[free], self.mass_liquid[free], self.mass_pore[free]
-                push = (gradient.T @ pressure)[free]
-                pair = free_pair.py_func(force[k][free], push, ms, ml, mn, 0.5 * dt * drag[free])
-                result[k, free], result[k + 2, free] = pair
-                result[k + 2] = np.where(free, self.through_liquid @ result[k + 2], 0.0)
-            else:
-                result[k, free] = force[k][free] / self.mass_solid[free]
-            result[k] = np.where(free, self.through_solid @ result[k], 0.0)
+        """Nodal accelerations [1/s2 times velocity]: (n_nodes, 4 or 2); dt [s] is that of the implicit drag."""
+        occupied, elements, rows, geometry = self.layout
+        divergence, force = np.zeros((len(self.per_volume), 2)), np.zeros((len(velocity), 4))
+        if self.smoothing:
+            sum_divergences(occupied, elements, rows, geometry, self.held, velocity, divergence)
+            divergence *= self.per_volume
+        sum_forces(occupied, elements, rows, geometry, self.held, velocity, self.smoothing, divergence, force)
+        before, result = np.zeros_like(velocity), np.zeros_like(velocity)
+        accelerate_nodes(force, self.nodal, 0.5 * dt * self.step_of_node, self.free, before)
+        through_points(occupied, elements, self.held, self.nodal, self.free, before, result)
         return result
-
-    def _mean(self, rates):
-        """Mean over the elements around each element's corners, weighted with the volume in them."""
-        if not self.smoothing:
-            return rates
-        nodal = self.per_volume * (self.to_nodes @ (self.volume * rates))
-        return self.to_nodes.T @ nodal / 3
-
-    @staticmethod
-    def _through(consistent):
-        """From nodal velocities to the points and back, (n_nodes, n_nodes), and the nodal mass [kg/m]."""
-        mass = consistent.sum(axis=1)
-        inverse = np.divide(1.0, mass, out=np.zeros_like(mass), where=mass > 0)
-        consistent.data *= np.repeat(inverse, np.diff(consistent.indptr))
-        return consistent, mass
 
     def largest(self, dt, start=None):
         """Largest eigenvalue [1/s2] with drag over dt [s], and its mode; start: a guess of the mode."""
         from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
         from threadpoolctl import threadpool_limits
 
-        shape = (4 if self.wet else 2, len(self.mass_solid))
+        shape = (len(self.nodal), 4 if self.wet else 2)
         size = shape[0] * shape[1]
         operator = LinearOperator(
             (size, size), matvec=lambda u: -self.accelerations(u.reshape(shape), dt).ravel(), dtype=float
@@ -163,7 +254,9 @@ class Spectrum:
         try:
             # one thread: the bits must not depend on how many there are, and small products gain nothing from more
             with threadpool_limits(1, user_api="blas"):
-                values, modes = eigs(operator, k=1, which="LM", v0=start, ncv=min(16, size), tol=TOLERANCE, maxiter=40)
+                values, modes = eigs(
+                    operator, k=1, which="LM", v0=start, ncv=min(KRYLOV, size), tol=TOLERANCE, maxiter=40
+                )
         except ArpackNoConvergence:
             return math.inf, None
         return float(np.abs(values[0])), np.real(modes[:, 0])

@@ -61,19 +61,19 @@ def relax_elements(
         fxx = fyy = fxy = 0.0
         for j in range(start[e], start[e + 1]):
             i = order[j]
-            row = points[i]
-            s = soils[soil_of_point[i]]
-            v = row[MASS] / (s[S_RHO_S] * (1.0 - row[N]))
-            lam, shear = s[S_LAMBDA], s[S_G]
-            txx = row[SXX] + lam * vol + 2.0 * shear * exx
-            tyy = row[SYY] + lam * vol + 2.0 * shear * eyy
-            txy = row[SXY] + 2.0 * shear * exy
-            tzz = row[SZZ] + lam * vol
-            if strain and s[S_MODEL] != MODEL_ELASTIC:
+            s = soil_of_point[i]
+            v = points[i, MASS] / (soils[s, S_RHO_S] * (1.0 - points[i, N]))
+            lam, shear = soils[s, S_LAMBDA], soils[s, S_G]
+            txx = points[i, SXX] + lam * vol + 2.0 * shear * exx
+            tyy = points[i, SYY] + lam * vol + 2.0 * shear * eyy
+            txy = points[i, SXY] + 2.0 * shear * exy
+            tzz = points[i, SZZ] + lam * vol
+            if strain and soils[s, S_MODEL] != MODEL_ELASTIC:
                 txx, tyy, tzz, txy, _ = mohr_coulomb(
-                    txx, tyy, tzz, txy, shear, s[S_K], s[S_C_COS], s[S_SIN], s[S_SIN_DIL], s[S_APEX], s[S_TENSION]
-                )
-            row[SXX], row[SYY], row[SZZ], row[SXY] = txx, tyy, tzz, txy
+                    txx, tyy, tzz, txy, shear, soils[s, S_K], soils[s, S_C_COS], soils[s, S_SIN], soils[s, S_SIN_DIL],
+                    soils[s, S_APEX], soils[s, S_TENSION],
+                )  # fmt: skip
+            points[i, SXX], points[i, SYY], points[i, SZZ], points[i, SXY] = txx, tyy, tzz, txy
             fxx += v * txx
             fyy += v * tyy
             fxy += v * txy

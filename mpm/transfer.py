@@ -3,13 +3,16 @@
 Each kernel works on a range of the list of occupied elements and writes only to rows that these
 elements own, so ranges may run in any number of threads with the same bits. Shape functions are
 those of the linear triangle; `geometry` rows hold (g1x, g1y, g2x, g2y, x0, y0, area, height).
+
+Arrays are read as `points[i, X]`, never through a row `points[i]` taken in a loop over points: numba counts the
+references of every such view, and the two calls a point cost as much as its arithmetic.
 """
 
 from functools import cache
 
 import numpy as np
 
-from mpm.jit import inline_kernel, kernel
+from mpm.jit import index, inline_kernel, kernel
 from mpm.materials.mohr_coulomb import mohr_coulomb
 from mpm.variables import (
     B_D,
@@ -116,88 +119,95 @@ def advance_kernel(wet, tied):
 
         Source: Sulsky, Zhou & Schreyer (1995) for MUSL; Zhu & Bridson (2005) for the PIC/FLIP blend.
         """
-        n_nodes = nodes.shape[0] - mean.shape[0]
+        n_nodes = index(nodes.shape[0] - mean.shape[0])
         for k in range(first, last):
-            e = occupied[k]
+            e = index(occupied[k])
             dt = dt_of_level[level_of_element[e]]
             flip_fraction = flip_of_level[level_of_element[e]]
             g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
             x0, y0 = geometry[e, 4], geometry[e, 5]
-            a = nodes[rows[e, 0]]
-            b = nodes[rows[e, 1]]
-            c = nodes[rows[e, 2]]
-            if tied:
+            a, b, c = index(rows[e, 0]), index(rows[e, 1]), index(rows[e, 2])
+            border = tied and max(a, b, c) >= n_nodes
+            jx0 = jx1 = jx2 = jy0 = jy1 = jy2 = 0.0
+            if border:
                 # points move with the mean over all steps of a node, which ends with another velocity
-                jx0 = jx1 = jx2 = jy0 = jy1 = jy2 = 0.0
-                if rows[e, 0] >= n_nodes:
-                    jx0, jy0 = mean[rows[e, 0] - n_nodes, 0] - a[V_SX], mean[rows[e, 0] - n_nodes, 1] - a[V_SY]
-                if rows[e, 1] >= n_nodes:
-                    jx1, jy1 = mean[rows[e, 1] - n_nodes, 0] - b[V_SX], mean[rows[e, 1] - n_nodes, 1] - b[V_SY]
-                if rows[e, 2] >= n_nodes:
-                    jx2, jy2 = mean[rows[e, 2] - n_nodes, 0] - c[V_SX], mean[rows[e, 2] - n_nodes, 1] - c[V_SY]
+                if a >= n_nodes:
+                    jx0, jy0 = mean[a - n_nodes, 0] - nodes[a, V_SX], mean[a - n_nodes, 1] - nodes[a, V_SY]
+                if b >= n_nodes:
+                    jx1, jy1 = mean[b - n_nodes, 0] - nodes[b, V_SX], mean[b - n_nodes, 1] - nodes[b, V_SY]
+                if c >= n_nodes:
+                    jx2, jy2 = mean[c - n_nodes, 0] - nodes[c, V_SX], mean[c - n_nodes, 1] - nodes[c, V_SY]
             sx0 = sx1 = sx2 = sy0 = sy1 = sy2 = lx0 = lx1 = lx2 = ly0 = ly1 = ly2 = 0.0
             pic = 1.0 - flip_fraction
             for j in range(start[e], start[e + 1]):
-                i = order[j]
-                row = points[i]
-                m = row[MASS]
-                dx = row[X] - x0
-                dy = row[Y] - y0
+                i = index(order[j])
+                dx = points[i, X] - x0
+                dy = points[i, Y] - y0
                 n1 = g1x * dx + g1y * dy
                 n2 = g2x * dx + g2y * dy
                 n0 = 1.0 - n1 - n2
                 if tied and (n0 < 0.0 or n1 < 0.0 or n2 < 0.0):
                     n0, n1, n2 = on_element(n0, n1, n2)
-                gx = n0 * a[V_SX] + n1 * b[V_SX] + n2 * c[V_SX]
-                gy = n0 * a[V_SY] + n1 * b[V_SY] + n2 * c[V_SY]
-                vx = flip_fraction * (row[VSX] + n0 * a[V_DSX] + n1 * b[V_DSX] + n2 * c[V_DSX]) + pic * gx
-                vy = flip_fraction * (row[VSY] + n0 * a[V_DSY] + n1 * b[V_DSY] + n2 * c[V_DSY]) + pic * gy
-                row[VSX], row[VSY] = vx, vy
-                if tied:
+                m = points[i, MASS]
+                gx = n0 * nodes[a, V_SX] + n1 * nodes[b, V_SX] + n2 * nodes[c, V_SX]
+                gy = n0 * nodes[a, V_SY] + n1 * nodes[b, V_SY] + n2 * nodes[c, V_SY]
+                vx = points[i, VSX] + n0 * nodes[a, V_DSX] + n1 * nodes[b, V_DSX] + n2 * nodes[c, V_DSX]
+                vy = points[i, VSY] + n0 * nodes[a, V_DSY] + n1 * nodes[b, V_DSY] + n2 * nodes[c, V_DSY]
+                vx = flip_fraction * vx + pic * gx
+                vy = flip_fraction * vy + pic * gy
+                if wet:
+                    w = m / (soils[index(soil_of_point[i]), S_RHO_S] * (1.0 - points[i, N])) * density_liquid
+                    hx = n0 * nodes[a, V_LX] + n1 * nodes[b, V_LX] + n2 * nodes[c, V_LX]
+                    hy = n0 * nodes[a, V_LY] + n1 * nodes[b, V_LY] + n2 * nodes[c, V_LY]
+                    ux = points[i, VLX] + n0 * nodes[a, V_DLX] + n1 * nodes[b, V_DLX] + n2 * nodes[c, V_DLX]
+                    uy = points[i, VLY] + n0 * nodes[a, V_DLY] + n1 * nodes[b, V_DLY] + n2 * nodes[c, V_DLY]
+                    ux = flip_fraction * ux + pic * hx
+                    uy = flip_fraction * uy + pic * hy
+                    smooth = max(n0 * nodes[a, V_P] + n1 * nodes[b, V_P] + n2 * nodes[c, V_P], 0.0)
+                    # the terms of each node in the order of its sums, so that they become vectors
+                    sx0 += n0 * (m * vx)
+                    sy0 += n0 * (m * vy)
+                    lx0 += n0 * (w * ux)
+                    ly0 += n0 * (w * uy)
+                    sx1 += n1 * (m * vx)
+                    sy1 += n1 * (m * vy)
+                    lx1 += n1 * (w * ux)
+                    ly1 += n1 * (w * uy)
+                    sx2 += n2 * (m * vx)
+                    sy2 += n2 * (m * vy)
+                    lx2 += n2 * (w * ux)
+                    ly2 += n2 * (w * uy)
+                    points[i, VSX], points[i, VSY], points[i, VLX], points[i, VLY] = vx, vy, ux, uy
+                    if points[i, P] > 0.0:
+                        points[i, P] += pressure_filter * (smooth - points[i, P])
+                else:
+                    sx0 += n0 * (m * vx)
+                    sy0 += n0 * (m * vy)
+                    sx1 += n1 * (m * vx)
+                    sy1 += n1 * (m * vy)
+                    sx2 += n2 * (m * vx)
+                    sy2 += n2 * (m * vy)
+                    points[i, VSX], points[i, VSY] = vx, vy
+                if border:
                     gx += n0 * jx0 + n1 * jx1 + n2 * jx2
                     gy += n0 * jy0 + n1 * jy1 + n2 * jy2
-                row[X] += dt * gx
-                row[Y] += dt * gy
-                sx0 += n0 * m * vx
-                sx1 += n1 * m * vx
-                sx2 += n2 * m * vx
-                sy0 += n0 * m * vy
-                sy1 += n1 * m * vy
-                sy2 += n2 * m * vy
-                if wet:
-                    w = m / (soils[soil_of_point[i], S_RHO_S] * (1.0 - row[N])) * density_liquid
-                    hx = n0 * a[V_LX] + n1 * b[V_LX] + n2 * c[V_LX]
-                    hy = n0 * a[V_LY] + n1 * b[V_LY] + n2 * c[V_LY]
-                    ux = flip_fraction * (row[VLX] + n0 * a[V_DLX] + n1 * b[V_DLX] + n2 * c[V_DLX]) + pic * hx
-                    uy = flip_fraction * (row[VLY] + n0 * a[V_DLY] + n1 * b[V_DLY] + n2 * c[V_DLY]) + pic * hy
-                    row[VLX], row[VLY] = ux, uy
-                    if row[P] > 0.0:
-                        smooth = max(n0 * a[V_P] + n1 * b[V_P] + n2 * c[V_P], 0.0)
-                        row[P] += pressure_filter * (smooth - row[P])
-                    lx0 += n0 * w * ux
-                    lx1 += n1 * w * ux
-                    lx2 += n2 * w * ux
-                    ly0 += n0 * w * uy
-                    ly1 += n1 * w * uy
-                    ly2 += n2 * w * uy
-            d = sums[rows[e, 0]]
-            d[0] += sx0
-            d[1] += sy0
+                points[i, X] += dt * gx
+                points[i, Y] += dt * gy
+            sums[a, 0] += sx0
+            sums[a, 1] += sy0
             if wet:
-                d[2] += lx0
-                d[3] += ly0
-            d = sums[rows[e, 1]]
-            d[0] += sx1
-            d[1] += sy1
+                sums[a, 2] += lx0
+                sums[a, 3] += ly0
+            sums[b, 0] += sx1
+            sums[b, 1] += sy1
             if wet:
-                d[2] += lx1
-                d[3] += ly1
-            d = sums[rows[e, 2]]
-            d[0] += sx2
-            d[1] += sy2
+                sums[b, 2] += lx1
+                sums[b, 3] += ly1
+            sums[c, 0] += sx2
+            sums[c, 1] += sy2
             if wet:
-                d[2] += lx2
-                d[3] += ly2
+                sums[c, 2] += lx2
+                sums[c, 3] += ly2
 
     return advance_points
 
@@ -216,40 +226,35 @@ def rates_kernel(wet):
             this times both divergences and times the gradient of the projected pore pressure.
         """
         for k in range(first, last):
-            e = occupied[k]
+            e = index(occupied[k])
             g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
-            a = nodes[rows[e, 0]]
-            b = nodes[rows[e, 1]]
-            c = nodes[rows[e, 2]]
-            ux1, ux2 = b[V_SX] - a[V_SX], c[V_SX] - a[V_SX]
-            uy1, uy2 = b[V_SY] - a[V_SY], c[V_SY] - a[V_SY]
+            a, b, c = index(rows[e, 0]), index(rows[e, 1]), index(rows[e, 2])
+            ux1, ux2 = nodes[b, V_SX] - nodes[a, V_SX], nodes[c, V_SX] - nodes[a, V_SX]
+            uy1, uy2 = nodes[b, V_SY] - nodes[a, V_SY], nodes[c, V_SY] - nodes[a, V_SY]
             xx = g1x * ux1 + g2x * ux2
             yy = g1y * uy1 + g2y * uy2
             xy = g1y * ux1 + g2y * ux2
             yx = g1x * uy1 + g2x * uy2
-            r = rates[e]
-            r[R_XX], r[R_YY], r[R_XY], r[R_W] = xx, yy, 0.5 * (xy + yx), 0.5 * (yx - xy)
-            r[R_DS] = xx + yy
+            rates[e, R_XX], rates[e, R_YY], rates[e, R_XY], rates[e, R_W] = xx, yy, 0.5 * (xy + yx), 0.5 * (yx - xy)
+            rates[e, R_DS] = xx + yy
             v = volume[e, 0]
-            for corner in range(3):
-                d = sums[rows[e, corner]]
-                d[0] += v
-                d[1] += v * r[R_DS]
+            for d in (a, b, c):
+                sums[d, 0] += v
+                sums[d, 1] += v * rates[e, R_DS]
             if wet:
-                r[R_DL] = (
-                    g1x * (b[V_LX] - a[V_LX]) + g2x * (c[V_LX] - a[V_LX])
-                    + g1y * (b[V_LY] - a[V_LY]) + g2y * (c[V_LY] - a[V_LY])
+                rates[e, R_DL] = (
+                    g1x * (nodes[b, V_LX] - nodes[a, V_LX]) + g2x * (nodes[c, V_LX] - nodes[a, V_LX])
+                    + g1y * (nodes[b, V_LY] - nodes[a, V_LY]) + g2y * (nodes[c, V_LY] - nodes[a, V_LY])
                 )  # fmt: skip
                 pressed = volume[e, 1]
-                p1, p2 = b[V_P] - a[V_P], c[V_P] - a[V_P]
+                p1, p2 = nodes[b, V_P] - nodes[a, V_P], nodes[c, V_P] - nodes[a, V_P]
                 px, py = pressed * (g1x * p1 + g2x * p2), pressed * (g1y * p1 + g2y * p2)
-                for corner in range(3):
-                    d = sums[rows[e, corner]]
-                    d[2] += pressed
-                    d[3] += pressed * r[R_DS]
-                    d[4] += pressed * r[R_DL]
-                    d[5] += px
-                    d[6] += py
+                for d in (a, b, c):
+                    sums[d, 2] += pressed
+                    sums[d, 3] += pressed * rates[e, R_DS]
+                    sums[d, 4] += pressed * rates[e, R_DL]
+                    sums[d, 5] += px
+                    sums[d, 6] += py
 
     return element_rates
 
@@ -266,7 +271,7 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
     def update_points(
         first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, bulk_liquid, rows,
         geometry, nodes, rates, volume, level_of_element, dt_of_level, ahead, advance, wave_speed, element_of_point,
-        clamps, sums,
+        clamps, sums, left,
     ):  # fmt: skip
         """Advance stress, pore pressure and porosity of the points of a range of elements, and map them to the nodes.
 
@@ -292,6 +297,8 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
             Written: -2 - element for a point that left its element.
         sums : (n_rows, 13) float64
             Added: masses, momenta, drag and forces of these elements.
+        left : (n_points,) int32
+            Written: the points that left their element.
 
         Returns
         -------
@@ -308,18 +315,17 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
         bad = -1
         third = 1.0 / 3.0
         for k in range(first, last):
-            e = occupied[k]
+            e = index(occupied[k])
             g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
             x0, y0 = geometry[e, 4], geometry[e, 5]
-            r = rates[e]
             dt = dt_of_level[level_of_element[e]]
-            i0, i1, i2 = rows[e, 0], rows[e, 1], rows[e, 2]
+            i0, i1, i2 = index(rows[e, 0]), index(rows[e, 1]), index(rows[e, 2])
             ms0 = ms1 = ms2 = ml0 = ml1 = ml2 = mn0 = mn1 = mn2 = d0 = d1 = d2 = q0 = q1 = q2 = 0.0
             sx0 = sx1 = sx2 = sy0 = sy1 = sy2 = lx0 = lx1 = lx2 = ly0 = ly1 = ly2 = 0.0
             fxx = fxy = fyy = fp = total = pressed = fastest = 0.0
             p0 = p1 = p2 = px = py = 0.0
-            own_s = dt * r[R_DS]
-            ts = r[R_DS]
+            own_s = dt * rates[e, R_DS]
+            ts = rates[e, R_DS]
             if smoothing:
                 ts = third * (nodes[i0, V_TS] + nodes[i1, V_TS] + nodes[i2, V_TS])
             if wet:
@@ -327,42 +333,43 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
                 # gradient of the projected pressure, less its nodal mean: zero for a linear pressure
                 px = g1x * (p1 - p0) + g2x * (p2 - p0) - third * (nodes[i0, V_GX] + nodes[i1, V_GX] + nodes[i2, V_GX])
                 py = g1y * (p1 - p0) + g2y * (p2 - p0) - third * (nodes[i0, V_GY] + nodes[i1, V_GY] + nodes[i2, V_GY])
-                own_l = dt * r[R_DL]
+                own_l = dt * rates[e, R_DL]
                 wet_s, wet_l = own_s, own_l
                 if smoothing and volume[e, 1] > 0.0:
                     wet_s = dt * third * (nodes[i0, V_WS] + nodes[i1, V_WS] + nodes[i2, V_WS])
                     wet_l = dt * third * (nodes[i0, V_WL] + nodes[i1, V_WL] + nodes[i2, V_WL])
-            correction = 0.5 * (ts - r[R_DS])
-            exx = dt * (r[R_XX] + correction)
-            eyy = dt * (r[R_YY] + correction)
-            exy = dt * r[R_XY]
-            spin = dt * r[R_W]
+            correction = 0.5 * (ts - rates[e, R_DS])
+            exx = dt * (rates[e, R_XX] + correction)
+            eyy = dt * (rates[e, R_YY] + correction)
+            exy = dt * rates[e, R_XY]
+            spin = dt * rates[e, R_W]
             ts *= dt
             mean = ts * third
             equivalent = np.sqrt(2.0 * third * ((exx - mean) ** 2 + (eyy - mean) ** 2 + mean * mean + 2.0 * exy * exy))
             full = volume[e, 0] >= geometry[e, 6]
+            border = tied and ahead[e] > 0.0
+            cxx = cyy = cxy = cp = 0.0
             for j in range(start[e], start[e + 1]):
-                i = order[j]
-                row = points[i]
-                s = soils[soil_of_point[i]]
+                i = index(order[j])
+                s = index(soil_of_point[i])
                 dxx, dyy, dvol = exx, eyy, ts
-                if dilatant and s[S_SIN_DIL] > 0.0:
-                    dxx, dyy, dvol = dt * r[R_XX], dt * r[R_YY], own_s
-                if tied and ahead[e] > 0.0:
-                    before = max(row[P], 0.0) if wet else 0.0
-                    cxx, cyy, cxy, cp = row[SXX] - before, row[SYY] - before, row[SXY], before
+                if dilatant and soils[s, S_SIN_DIL] > 0.0:
+                    dxx, dyy, dvol = dt * rates[e, R_XX], dt * rates[e, R_YY], own_s
+                if border:
+                    before = max(points[i, P], 0.0) if wet else 0.0
+                    cxx, cyy, cxy, cp = points[i, SXX] - before, points[i, SYY] - before, points[i, SXY], before
                 if advance:
-                    n = row[N]
-                    p = row[P]
-                    loose = n >= s[S_LOOSE]
-                    row[EQ] += equivalent
+                    n = points[i, N]
+                    p = points[i, P]
+                    loose = n >= soils[s, S_LOOSE]
+                    points[i, EQ] += equivalent
                     es = own_s
                     if wet and p > 0.0:
                         es = wet_s
                     if loose and p <= 0.0 and not full:
                         # lumps with air between them: shape changes, neither grains nor water are squeezed
-                        row[SXX] = row[SYY] = row[SZZ] = row[SXY] = 0.0
-                        row[P] = 0.0
+                        points[i, SXX] = points[i, SYY] = points[i, SZZ] = points[i, SXY] = 0.0
+                        points[i, P] = 0.0
                         n_suspended += 1
                     else:
                         if wet:
@@ -370,11 +377,11 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
                             # own rates, which are what moves its points
                             el = wet_l if p > 0.0 else own_l
                             p -= bulk_liquid / n * ((1.0 - n) * es + n * el)
-                            row[P] = p
+                            points[i, P] = p
                             if p < 0.0:
                                 n_cavitated += 1
                         # looser than in the ground, grains close up by what moves them; else with the skeleton's strain
-                        change = es if n > s[S_N0] else dvol
+                        change = es if n > soils[s, S_N0] else dvol
                         if not (loose and p <= 0.0 and change > 0.0):
                             n = 1.0 - (1.0 - n) / (1.0 + change)
                             if n < POROSITY_FLOOR:
@@ -383,92 +390,102 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
                             elif n > POROSITY_CEILING:
                                 n = POROSITY_CEILING
                                 n_ceiling += 1
-                            row[N] = n
-                        if n >= s[S_LOOSE]:
-                            row[SXX] = row[SYY] = row[SZZ] = row[SXY] = 0.0
+                            points[i, N] = n
+                        if n >= soils[s, S_LOOSE]:
+                            points[i, SXX] = points[i, SYY] = points[i, SZZ] = points[i, SXY] = 0.0
                             n_suspended += 1
                         else:
-                            lam, shear = s[S_LAMBDA], s[S_G]
-                            sxx, syy, sxy = row[SXX], row[SYY], row[SXY]
+                            lam, shear = soils[s, S_LAMBDA], soils[s, S_G]
+                            sxx, syy, sxy = points[i, SXX], points[i, SYY], points[i, SXY]
                             turn = 2.0 * spin * sxy
                             txx = sxx - turn + lam * dvol + 2.0 * shear * dxx
                             tyy = syy + turn + lam * dvol + 2.0 * shear * dyy
                             txy = sxy + spin * (sxx - syy) + 2.0 * shear * exy
-                            tzz = row[SZZ] + lam * dvol
-                            if plastic and s[S_MODEL] != MODEL_ELASTIC:
+                            tzz = points[i, SZZ] + lam * dvol
+                            if plastic and soils[s, S_MODEL] != MODEL_ELASTIC:
                                 txx, tyy, tzz, txy, cut = mohr_coulomb(
-                                    txx, tyy, tzz, txy, shear, s[S_K], s[S_C_COS], s[S_SIN], s[S_SIN_DIL], s[S_APEX],
-                                    s[S_TENSION],
+                                    txx, tyy, tzz, txy, shear, soils[s, S_K], soils[s, S_C_COS], soils[s, S_SIN],
+                                    soils[s, S_SIN_DIL], soils[s, S_APEX], soils[s, S_TENSION],
                                 )  # fmt: skip
                                 if cut > 0.0:
                                     n_tension += 1
-                            row[SXX], row[SYY], row[SZZ], row[SXY] = txx, tyy, tzz, txy
-                    if bad < 0 and not np.isfinite(
-                        row[SXX] + row[P] + row[VSX] + row[VSY] + row[VLX] + row[VLY] + row[N]
-                    ):
-                        bad = i
-                dx = row[X] - x0
-                dy = row[Y] - y0
+                            points[i, SXX], points[i, SYY], points[i, SZZ], points[i, SXY] = txx, tyy, tzz, txy
+                    checked = points[i, SXX] + points[i, P] + points[i, N]
+                    checked += points[i, VSX] + points[i, VSY] + points[i, VLX] + points[i, VLY]
+                    if bad < 0 and not np.isfinite(checked):
+                        bad = np.int64(i)
+                dx = points[i, X] - x0
+                dy = points[i, Y] - y0
                 n1 = g1x * dx + g1y * dy
                 n2 = g2x * dx + g2y * dy
                 if n1 < 0.0 or n2 < 0.0 or n1 + n2 > 1.0:
-                    element_of_point[i] = -2 - e  # left: to be searched from e
+                    element_of_point[i] = -2 - np.int64(e)  # to be searched from e
+                    left[moved] = i
                     moved += 1
                     continue
-                m = row[MASS]
-                n = row[N]
-                v = m / (s[S_RHO_S] * (1.0 - n))
                 n0 = 1.0 - n1 - n2
-                ms0 += n0 * m
-                ms1 += n1 * m
-                ms2 += n2 * m
-                vx, vy = row[VSX], row[VSY]
-                sx0 += n0 * m * vx
-                sx1 += n1 * m * vx
-                sx2 += n2 * m * vx
-                sy0 += n0 * m * vy
-                sy1 += n1 * m * vy
-                sy2 += n2 * m * vy
+                m, n = points[i, MASS], points[i, N]
+                v = m / (soils[s, S_RHO_S] * (1.0 - n))
+                vx, vy = points[i, VSX], points[i, VSY]
                 fastest = max(fastest, vx * vx + vy * vy)
                 p = 0.0
                 if wet:
-                    w = v * density_liquid
-                    w0, w1, w2 = n0 * w, n1 * w, n2 * w
-                    ml0 += w0
-                    ml1 += w1
-                    ml2 += w2
-                    mn0 += n * w0
-                    mn1 += n * w1
-                    mn2 += n * w2
-                    drag = n * s[S_DRAG]
-                    d0 += drag * w0
-                    d1 += drag * w1
-                    d2 += drag * w2
-                    ux, uy = row[VLX], row[VLY]
-                    lx0 += w0 * ux
-                    lx1 += w1 * ux
-                    lx2 += w2 * ux
-                    ly0 += w0 * uy
-                    ly1 += w1 * uy
-                    ly2 += w2 * uy
-                    fastest = max(fastest, ux * ux + uy * uy)
-                    if row[P] > 0.0:
-                        p = row[P]
-                        pressed += v
+                    p = max(points[i, P], 0.0)
+                    pressed += v if p > 0.0 else 0.0
                     excess = v * (p - (n0 * p0 + n1 * p1 + n2 * p2))
-                    q0 += n0 * excess
-                    q1 += n1 * excess
-                    q2 += n2 * excess
                     fp += v * p
-                fxx += v * (row[SXX] - p)
-                fyy += v * (row[SYY] - p)
-                fxy += v * row[SXY]
+                    w = v * density_liquid
+                    pore = n * w
+                    drag = pore * soils[s, S_DRAG]
+                    ux, uy = points[i, VLX], points[i, VLY]
+                    fastest = max(fastest, ux * ux + uy * uy)
+                    # the terms of each node in the order of its sums, so that they become vectors
+                    ms0 += n0 * m
+                    ml0 += n0 * w
+                    mn0 += n0 * pore
+                    d0 += n0 * drag
+                    sx0 += n0 * (m * vx)
+                    sy0 += n0 * (m * vy)
+                    lx0 += n0 * (w * ux)
+                    ly0 += n0 * (w * uy)
+                    q0 += n0 * excess
+                    ms1 += n1 * m
+                    ml1 += n1 * w
+                    mn1 += n1 * pore
+                    d1 += n1 * drag
+                    sx1 += n1 * (m * vx)
+                    sy1 += n1 * (m * vy)
+                    lx1 += n1 * (w * ux)
+                    ly1 += n1 * (w * uy)
+                    q1 += n1 * excess
+                    ms2 += n2 * m
+                    ml2 += n2 * w
+                    mn2 += n2 * pore
+                    d2 += n2 * drag
+                    sx2 += n2 * (m * vx)
+                    sy2 += n2 * (m * vy)
+                    lx2 += n2 * (w * ux)
+                    ly2 += n2 * (w * uy)
+                    q2 += n2 * excess
+                else:
+                    ms0 += n0 * m
+                    sx0 += n0 * (m * vx)
+                    sy0 += n0 * (m * vy)
+                    ms1 += n1 * m
+                    sx1 += n1 * (m * vx)
+                    sy1 += n1 * (m * vy)
+                    ms2 += n2 * m
+                    sx2 += n2 * (m * vx)
+                    sy2 += n2 * (m * vy)
+                fxx += v * (points[i, SXX] - p)
+                fyy += v * (points[i, SYY] - p)
+                fxy += v * points[i, SXY]
                 total += v
-                if tied and ahead[e] > 0.0:
+                if border:
                     w = ahead[e] * v
-                    fxx += w * (row[SXX] - p - cxx)
-                    fyy += w * (row[SYY] - p - cyy)
-                    fxy += w * (row[SXY] - cxy)
+                    fxx += w * (points[i, SXX] - p - cxx)
+                    fyy += w * (points[i, SYY] - p - cyy)
+                    fxy += w * (points[i, SXY] - cxy)
                     if wet:
                         fp += w * (p - cp)
             volume[e, 0] = total
@@ -479,55 +496,65 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
                 limit = local
                 limit_speed = fastest
             g0x, g0y = -g1x - g2x, -g1y - g2y
-            b = sums[i0]
-            b[B_MS] += ms0
-            b[B_PSX] += sx0
-            b[B_PSY] += sy0
-            b[B_FX] -= g0x * fxx + g0y * fxy
-            b[B_FY] -= g0x * fxy + g0y * fyy
-            b = sums[i1]
-            b[B_MS] += ms1
-            b[B_PSX] += sx1
-            b[B_PSY] += sy1
-            b[B_FX] -= g1x * fxx + g1y * fxy
-            b[B_FY] -= g1x * fxy + g1y * fyy
-            b = sums[i2]
-            b[B_MS] += ms2
-            b[B_PSX] += sx2
-            b[B_PSY] += sy2
-            b[B_FX] -= g2x * fxx + g2y * fxy
-            b[B_FY] -= g2x * fxy + g2y * fyy
             if wet:
                 # the smallest of the element's nodal shares of volume: a node that hardly touches it is not overdrawn
                 share = 3.0 * min(ml0, ml1, ml2) / (density_liquid * total) if total > 0.0 else 0.0
                 damped = PROJECTION_SMOOTHING * geometry[e, 7] ** 2 * share * pressed
-                b = sums[i0]
-                b[B_ML] += ml0
-                b[B_MN] += mn0
-                b[B_D] += d0
-                b[B_Q] += q0 - damped * (g0x * px + g0y * py)
-                b[B_PLX] += lx0
-                b[B_PLY] += ly0
-                b[B_FLX] += g0x * fp
-                b[B_FLY] += g0y * fp
-                b = sums[i1]
-                b[B_ML] += ml1
-                b[B_MN] += mn1
-                b[B_D] += d1
-                b[B_Q] += q1 - damped * (g1x * px + g1y * py)
-                b[B_PLX] += lx1
-                b[B_PLY] += ly1
-                b[B_FLX] += g1x * fp
-                b[B_FLY] += g1y * fp
-                b = sums[i2]
-                b[B_ML] += ml2
-                b[B_MN] += mn2
-                b[B_D] += d2
-                b[B_Q] += q2 - damped * (g2x * px + g2y * py)
-                b[B_PLX] += lx2
-                b[B_PLY] += ly2
-                b[B_FLX] += g2x * fp
-                b[B_FLY] += g2y * fp
+                sums[i0, B_MS] += ms0
+                sums[i0, B_ML] += ml0
+                sums[i0, B_MN] += mn0
+                sums[i0, B_D] += d0
+                sums[i0, B_PSX] += sx0
+                sums[i0, B_PSY] += sy0
+                sums[i0, B_PLX] += lx0
+                sums[i0, B_PLY] += ly0
+                sums[i0, B_Q] += q0 - damped * (g0x * px + g0y * py)
+                sums[i0, B_FX] -= g0x * fxx + g0y * fxy
+                sums[i0, B_FY] -= g0x * fxy + g0y * fyy
+                sums[i0, B_FLX] += g0x * fp
+                sums[i0, B_FLY] += g0y * fp
+                sums[i1, B_MS] += ms1
+                sums[i1, B_ML] += ml1
+                sums[i1, B_MN] += mn1
+                sums[i1, B_D] += d1
+                sums[i1, B_PSX] += sx1
+                sums[i1, B_PSY] += sy1
+                sums[i1, B_PLX] += lx1
+                sums[i1, B_PLY] += ly1
+                sums[i1, B_Q] += q1 - damped * (g1x * px + g1y * py)
+                sums[i1, B_FX] -= g1x * fxx + g1y * fxy
+                sums[i1, B_FY] -= g1x * fxy + g1y * fyy
+                sums[i1, B_FLX] += g1x * fp
+                sums[i1, B_FLY] += g1y * fp
+                sums[i2, B_MS] += ms2
+                sums[i2, B_ML] += ml2
+                sums[i2, B_MN] += mn2
+                sums[i2, B_D] += d2
+                sums[i2, B_PSX] += sx2
+                sums[i2, B_PSY] += sy2
+                sums[i2, B_PLX] += lx2
+                sums[i2, B_PLY] += ly2
+                sums[i2, B_Q] += q2 - damped * (g2x * px + g2y * py)
+                sums[i2, B_FX] -= g2x * fxx + g2y * fxy
+                sums[i2, B_FY] -= g2x * fxy + g2y * fyy
+                sums[i2, B_FLX] += g2x * fp
+                sums[i2, B_FLY] += g2y * fp
+            else:
+                sums[i0, B_MS] += ms0
+                sums[i0, B_PSX] += sx0
+                sums[i0, B_PSY] += sy0
+                sums[i0, B_FX] -= g0x * fxx + g0y * fxy
+                sums[i0, B_FY] -= g0x * fxy + g0y * fyy
+                sums[i1, B_MS] += ms1
+                sums[i1, B_PSX] += sx1
+                sums[i1, B_PSY] += sy1
+                sums[i1, B_FX] -= g1x * fxx + g1y * fxy
+                sums[i1, B_FY] -= g1x * fxy + g1y * fyy
+                sums[i2, B_MS] += ms2
+                sums[i2, B_PSX] += sx2
+                sums[i2, B_PSY] += sy2
+                sums[i2, B_FX] -= g2x * fxx + g2y * fxy
+                sums[i2, B_FY] -= g2x * fxy + g2y * fyy
         clamps[C_SUSPENDED] += n_suspended
         clamps[C_CAVITATED] += n_cavitated
         clamps[C_FLOOR] += n_floor

@@ -25,6 +25,7 @@ for factor in map(float, sys.argv[1:]):
     print("compiled" if scale.stats.cache_misses else "kept")
 """
 EVENT = """
+import numpy as np
 import mpm
 import mpm.contact, mpm.points, mpm.stages, mpm.transfer
 import sys; sys.path.insert(0, "tests")
@@ -35,7 +36,7 @@ solver.relax()
 solver.open_gate()
 for _ in range(40):
     solver.step()
-solver._relocate(solver.levels.count - 1)
+solver._relocate(np.zeros(2, np.int64), solver.levels.count - 1)
 kernels = [v for m in (mpm.contact, mpm.points, mpm.stages, mpm.transfer) for v in vars(m).values()]
 kernels += [v for v in vars(solver).values()]
 kernels = {k.py_func.__qualname__: k for k in kernels if hasattr(k, "py_func")}

@@ -45,7 +45,9 @@ def test_elastic_scene_is_the_limit_of_a_strength_that_is_never_reached():
     soil = scene().soils[0]
     elastic = stepped(scene(soils=(soil.model_copy(update={"model": "elastic"}),)))
     strong = stepped(scene(soils=(soil.model_copy(update={"cohesion": 1e12, "tensile_strength": 1e12}),)))
-    assert np.array_equal(elastic.points, strong.points)
+    # two compilations fuse products and sums differently: round-off of 60 steps, over each variable's largest value
+    scale = np.abs(elastic.points).max(axis=0)
+    assert (np.abs(elastic.points - strong.points) <= 1e-12 * scale).all()
 
 
 def test_dry_scene_has_no_water_pressure_and_less_weight():

@@ -21,7 +21,7 @@ BUILT = {
     "moving", "wall",
 }  # fmt: skip
 #: Written by each step before it is read.
-SCRATCH = {"ahead", "tied_means", "momenta", "nodal_means", "status", "rates", "_spare", "_moved"}
+SCRATCH = {"ahead", "tied_means", "momenta", "nodal_means", "status", "rates", "_spare", "_moved", "_left"}
 STATE = {*ARRAYS, *NUMBERS, "gate_open", "_mapped", "_limits", "mode"}
 
 
@@ -93,7 +93,7 @@ def test_continued_simulation_gives_the_bits_of_the_whole(scene, mesh, whole, wh
     simulation = mpm.Simulation(scene, mesh, threads)
     if simulation.solver.moving is not None:
         simulation.solver.wall[:] = np.nan
-    for name in SCRATCH - {"_spare", "_moved"}:
+    for name in SCRATCH - {"_spare", "_moved", "_left"}:
         array = getattr(simulation.solver, name)
         array[...] = np.nan if array.dtype.kind == "f" else 99
     simulation.restore(state)
