@@ -86,12 +86,13 @@ def run_content(path):
     from coupling.pressure_source import read_source
     from coupling.report.page import collect
 
-    content = {"info": describe(path)["facts"]}
+    content = {}
     for node in read_run(path).subtree:
         content |= {f"{node.path}@{name}": str(value) for name, value in node.attrs.items()}
         for name, variable in node.variables.items():
             content[f"{node.path}/{name}"] = np.asarray(variable.values)
             content |= {f"{node.path}/{name}@{key}": str(value) for key, value in variable.attrs.items()}
+    content["info"] = describe(path)["facts"]
     source = read_source(path)
     content["ring"] = source.ring.model_dump_json()
     content["page"] = len(str(collect(path)["numbers"]))
