@@ -173,7 +173,7 @@ def judged(path, kind, whole, before_change=None):
     if how == "raised":
         kinds, message, trace = answer
         assert kinds & REFUSALS, f"{kind}: {trace[-900:]}"
-        assert path.name.removesuffix(".journal") in message or "scene" in message or "study" in message, message
+        assert path.name.removesuffix(".journal") in message or re.search("scene|study|run file", message), message
         assert kind in ("checkpoint.h5", "run.nc.journal") or ";" in message or "missing" in message, message
         return "refused"
     other = [name for name in sorted(whole.keys() | answer.keys()) if not _equal(whole.get(name), answer.get(name))]
