@@ -22,7 +22,7 @@ COUNTS = {"scenes": 10_000, "files": 1_000}
 PYTHON_EVERY = 4  # every so many scenes also as Python dictionaries
 SIMULATED = 12
 #: Damages by kind of file; a run file takes a second, a scene a millisecond.
-SHARES = {"run.nc": 0.3, "checkpoint.h5": 0.25, "run.nc.journal": 0.15, "scene.toml": 0.2, "study.toml": 0.1}
+SHARES = {"run.nc": 0.15, "checkpoint.h5": 0.3, "run.nc.journal": 0.15, "scene.toml": 0.25, "study.toml": 0.15}
 STUDY = """name = "angles"
 scene = "quick"
 records = 11
@@ -156,7 +156,7 @@ def good_files(place):
     from coupling.datasets import CHECKED_FORMAT
 
     place.mkdir()
-    run = write_run(place / "run.nc", models=("beam-spring",))
+    run = write_run(place / "run.nc", times=(0.0, 0.5), models=("beam-spring",))
     change = place / "change"
     with journal.Overlay(run) as overlay:
         with h5netcdf.File(overlay, "r+", libver=CHECKED_FORMAT) as file:

@@ -109,11 +109,13 @@ def _kills(part):
 
 
 def _faults(faults):
-    return ["", *(f"- {fault}" for fault in faults[:20])] if faults else []
+    shown = [" ".join(fault.split())[-300:] for fault in faults[:20]]
+    return ["", *(f"- `{fault}`" for fault in shown)] if faults else []
 
 
 def _where(part):
-    return ["", f"Measured {part['date']} at revision {part['revision'] or 'unknown'} on {part['machine']}."]
+    note = ["", part["note"]] if "note" in part else []
+    return [*note, "", f"Measured {part['date']} at revision {part['revision'] or 'unknown'} on {part['machine']}."]
 
 
 def _processor():

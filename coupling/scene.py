@@ -106,7 +106,7 @@ def scene_names() -> list[str]:
     return sorted(names, key=lambda n: (n != "quick", n.rstrip("0123456789"), len(n), n))
 
 
-def load_scene(name: str | Path, **changes: Any) -> Scene:
+def load_scene(name: str | Path, /, **changes: Any) -> Scene:
     """Load a built-in scene by name or a TOML file by path.
 
     Parameters

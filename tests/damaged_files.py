@@ -86,12 +86,13 @@ def run_content(path):
     from coupling.pressure_source import read_source
     from coupling.report.page import collect
 
-    content = {"info": describe(path)["facts"]}
+    content = {}
     for node in read_run(path).subtree:
         content |= {f"{node.path}@{name}": str(value) for name, value in node.attrs.items()}
         for name, variable in node.variables.items():
             content[f"{node.path}/{name}"] = np.asarray(variable.values)
             content |= {f"{node.path}/{name}@{key}": str(value) for key, value in variable.attrs.items()}
+    content["info"] = describe(path)["facts"]
     source = read_source(path)
     content["ring"] = source.ring.model_dump_json()
     content["page"] = len(str(collect(path)["numbers"]))
@@ -172,7 +173,7 @@ def judged(path, kind, whole, before_change=None):
     if how == "raised":
         kinds, message, trace = answer
         assert kinds & REFUSALS, f"{kind}: {trace[-900:]}"
-        assert path.name.removesuffix(".journal") in message or "scene" in message, message
+        assert path.name.removesuffix(".journal") in message or re.search("scene|study|run file", message), message
         assert kind in ("checkpoint.h5", "run.nc.journal") or ";" in message or "missing" in message, message
         return "refused"
     other = [name for name in sorted(whole.keys() | answer.keys()) if not _equal(whole.get(name), answer.get(name))]

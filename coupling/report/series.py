@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 
+from coupling.datasets import RunFileError
 from coupling.report.packing import BASE64, evenly, packed
 
 PRESSURES = ("soil_pressure", "water_pressure", "soil_shear")
@@ -64,7 +65,12 @@ def model_series(name, response, times):
         joints (n_frames, n_joints), series (n_frames,): name to packed, SI.
     """
     rows, present = match_times(response["time"].values, times)
-    ring = json.loads(response.attrs.get("ring", "{}"))
+    try:
+        ring = json.loads(response.attrs.get("ring", "{}"))
+    except ValueError as error:
+        raise RunFileError(
+            f"run file: damaged, the attribute 'ring' of a response must be JSON, got: {error}; run `gush respond`"
+        ) from None
 
     def at_frames(variable):
         values = variable.transpose("time", ...).values[rows].astype(float)

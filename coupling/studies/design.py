@@ -174,6 +174,8 @@ def load_study(study: str | Path | dict | Study) -> Study:
             if item["type"] == "extra_forbidden":
                 near = difflib.get_close_matches(where, Study.model_fields, 1)
                 message += f"; did you mean {near[0]!r}?" if near else f"; known: {', '.join(Study.model_fields)}"
+            if ";" not in message:
+                message += "; correct it, `gush study table-2` is an example"
             number = _line(text, item["loc"] or re.findall(r"\w+", message)[:1])
             lines.append(f"line {number}: {message}" if number else message)
         raise StudyError("\n  ".join([f"{origin} has {len(lines)} mistake{'s' * (len(lines) > 1)}:", *lines])) from None
