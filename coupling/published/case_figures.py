@@ -91,7 +91,7 @@ def joint_deformation(study, inflow_mass, model="beam-spring"):
             axis.set_title(f"by {group}")
         for axis in axes[-1]:
             axis.set_xlabel("joint")
-            axis.legend(fontsize=6, loc="upper center", bbox_to_anchor=(0.5, -0.28), ncols=3)
+            axis.legend(fontsize=6, loc="upper center", bbox_to_anchor=(0.5, -0.28), ncols=2)
         figure.suptitle(f"at {inflow_mass:.0f} kg/m, {model}", fontsize=9)
     return figure
 
