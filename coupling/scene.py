@@ -450,13 +450,16 @@ def _messages(
             # Only the echo of the mistakes inside its entries.
             continue
         found.append(((*prefix, *item["loc"]), _message(item, model, extra_names)))
+    advice = "no default, see the built-in case-3 for an example"
+    for name in missing.pop((), []):
+        found.append(((*prefix, name), f"missing; it decides the answer and has {advice}"))
     for table, names in missing.items():
         # A soil is where newcomers change one number and lose the others.
         whole = (
             f"; [[{table[0]}]] replaces all {table[0]} of the base, so copy all keys of it" if len(table) > 1 else ""
         )
         them = "it decides the answer and has" if len(names) == 1 else "they decide the answer and have"
-        text = f"{', '.join(names)} missing; {them} no default, see the built-in case-3 for an example{whole}"
+        text = f"{', '.join(names)} missing; {them} {advice}{whole}"
         found.append(((*prefix, *table), text))
     return found
 

@@ -65,7 +65,7 @@ def fill(mesh, scene):
     area = _area(corners)
     soil_elements = np.flatnonzero(mesh.region == 0)
     tops = np.array([soil.top_depth for soil in scene.soils])
-    soil_of_element = np.searchsorted(tops, -centre[:, 1], side="right") - 1
+    soil_of_element = np.maximum(np.searchsorted(tops, -centre[:, 1], side="right") - 1, 0)  # heaps: the top soil
     near_gate = np.zeros(len(elements), bool)
     d = scene.discretisation
     if scene.gate is not None:
