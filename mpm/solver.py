@@ -412,7 +412,9 @@ class Solver:
         self.volume[:, 0] = np.bincount(element, volume, len(self.volume))
         self.volume[:, 1] = np.bincount(element, volume * (self.points[inside, P] > 0), len(self.volume))
         self._element_rates()
-        self._limits = [o[3:] for o in self._update_points(np.zeros(self.levels.count), False)]
+        outcome = self._update_points(np.zeros(self.levels.count), False)
+        self._limits = [o[3:] for o in outcome]
+        self._follow(outcome, self.levels.count - 1)  # points that were put onto edges
         self._mapped = True
 
     def _update_points(self, dt_of_level, advance, up_to=-1):
@@ -507,6 +509,10 @@ class Solver:
         self.suspended = sum(o[2] for o in outcome)
         self.point_steps += int(self._points_up_to[finished])
         self.step_count += 1
+        self._follow(outcome, finished)
+
+    def _follow(self, outcome, finished):
+        """Find the elements of the points that left theirs."""
         n_left = np.zeros(PARTS, np.int64)
         n_left[: len(outcome)] = [o[0] for o in outcome]
         if n_left.any():
