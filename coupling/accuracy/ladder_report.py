@@ -30,7 +30,7 @@ def write_ladder(ladder, name: str, runs: list[dict], folder: Path) -> dict:
         "are means over ten degrees to either side. The runs were computed with revision "
         f"{', '.join(sorted({r['revision'] for r in runs}))}.",
         "",
-        "| mesh over the scene's | points | steps | CPU s | time of the last record [s] |",
+        "| mesh over the scene's | point updates a step | steps | CPU s | time of the last record [s] |",
         "|---|---|---|---|---|",
         *(
             f"| {r['factor']:.3f} | {r['points']} | {r['steps']} | {r['cpu_seconds']:.0f} | {r['time']:.2f} |"
