@@ -83,7 +83,7 @@ def write(rows: list[dict], problems: dict, folder: Path) -> dict:
             f"{setting} {order:.2f}" for setting, order in entry["orders"].items() if math.isfinite(order)
         )
         page.append(
-            f"| [{name}](#{name}) | {entry['error']:.2e} | {entry['limit']:.2g} | {entry['cpu_seconds']:.2f} |"
+            f"| [{name}](#{name.lower()}) | {entry['error']:.2e} | {entry['limit']:.2g} | {entry['cpu_seconds']:.2f} |"
             f" {orders or '-'} | {entry['excess']:.2f} |"
         )
     page += ["", *READING.strip().splitlines()]
