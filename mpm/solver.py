@@ -49,7 +49,7 @@ PARTS = 2  # parts of the mesh that sum at the nodes on their own: fixed, so the
 STEPS_BETWEEN_SORTS = 100
 # Long steps between spectra, each of which costs about half a dozen: soon again where the critical step has fallen, as
 # when points have left the places they began in.
-FEWEST_BETWEEN_SPECTRA, MOST_BETWEEN_SPECTRA, MOST_BETWEEN_SPECTRA_OF_LEVELS = 5, 200, 50
+FEWEST_BETWEEN_SPECTRA, MOST_BETWEEN_SPECTRA, MOST_BETWEEN_SPECTRA_OF_LEVELS = 5, 200, 25
 ALMOST = 1.1  # a step shortened by less to meet an output time counts as limited by what limited it before
 # Of the spectral step over that of the altitude. Beyond, a few points resist nothing where they are: no estimate.
 MOST_OVER_ALTITUDE = 4.0
@@ -111,7 +111,7 @@ class Solver:
         self.status = np.zeros(n, np.int8)
         self.rates = np.zeros((m, RATE_WIDTH))
         self.volume = np.zeros((m, 2))
-        self.ahead = np.zeros(m)
+        self.ahead, self._periods = np.zeros(m), np.ones(self.levels.count, np.int64)  # equal steps: nothing runs ahead
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
         self.threads = 1 if m < SMALLEST_PARALLEL else max(1, min(threads or cores, PARTS))
         self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
@@ -465,8 +465,8 @@ class Solver:
                 limit = "output"
             smallest = dt_max / (steps * count)
         dt_of_level = smallest * periods
-        if self.levels.count > 1:
-            self.ahead[:] = self.levels.ahead(periods)
+        if not np.array_equal(periods, self._periods):
+            self._periods, self.ahead[:] = periods, self.levels.ahead(periods)
         for k in range(count):
             self._substep(dt_of_level, _last_multiple(periods, k), _last_multiple(periods, k + 1))
         self.time += smallest * count

@@ -18,10 +18,10 @@ BUILT = {
     "_relocate_points", "_water_density", "_water_modulus", "start", "order", "occupied", "n_occupied", "n_active",
     "_element_cuts", "_row_cuts", "_points_up_to", "levels",
     "copies", "mirror_line", "mirror_rows",
-    "moving", "wall",
+    "moving", "wall", "ahead", "_periods",
 }  # fmt: skip
 #: Written by each step before it is read.
-SCRATCH = {"ahead", "tied_means", "momenta", "nodal_means", "status", "rates", "_spare", "_moved", "_left"}
+SCRATCH = {"tied_means", "momenta", "nodal_means", "status", "rates", "_spare", "_moved", "_left"}
 STATE = {*ARRAYS, *NUMBERS, "gate_open", "_mapped", "_limits", "mode"}
 
 

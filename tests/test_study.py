@@ -299,3 +299,17 @@ def test_sensitivity_ranks_parameters_by_their_effect():
 def test_definition_travels_with_the_data(fast, tmp_path):
     data = coupling.study(TINY, tmp_path, workers=0)
     assert Study.model_validate(json.loads(data.attrs["study"])) == load_study(TINY)
+
+
+def test_study_without_workers_says_so_instead_of_waiting(monkeypatch):
+    class NoCluster:
+        def scheduler_info(self, n_workers):
+            return {"workers": {}}
+
+    class NothingReady:
+        def has_ready(self):
+            return False
+
+    monkeypatch.setattr(execute, "LONGEST_WITHOUT_WORKERS", 0.2)
+    with pytest.raises(StudyError, match=r"no worker has been there for 0.2 s; what is done is kept"):
+        execute._wait(NoCluster(), NothingReady())

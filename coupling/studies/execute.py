@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import time as clock
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,8 @@ from coupling.studies.progress import StudyState, watching
 
 #: Times that a case may lose its worker, the last ones with nothing beside it.
 LOSSES = 3
+#: Workers that were lost are started again within seconds [s].
+LONGEST_WITHOUT_WORKERS = 60.0
 CASES, STATUS_FILE, DATA_FILE, STUDY_FILE = "cases", "status.json", "study.nc", "study.json"
 
 
@@ -158,12 +161,33 @@ def _submitted(client, plan, todo, folder, at_once):
     for _ in range(min(at_once, len(waiting))):
         submit()
     while running:
+        _wait(client, pool)
         future = next(pool)
         case = running.pop(future)
         failure = future.exception()
         if waiting:
             submit()
         yield case, failure
+
+
+def _wait(client, pool):
+    """Until a case has ended.
+
+    Raises
+    ------
+    StudyError
+        When no worker has been there for a while: a case that was given to none would be waited for in vain.
+    """
+    seen = clock.monotonic()
+    while not pool.has_ready():
+        clock.sleep(0.1)
+        if client.scheduler_info(n_workers=-1)["workers"]:
+            seen = clock.monotonic()
+        elif clock.monotonic() - seen > LONGEST_WITHOUT_WORKERS:
+            raise StudyError(
+                f"study: no worker has been there for {LONGEST_WITHOUT_WORKERS:g} s; what is done is kept, repeat the "
+                "command to go on"
+            )
 
 
 def _alone(client, plan, case, folder):
