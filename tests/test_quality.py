@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 from synthetic_run import make_quick_scene
 from test_cli import simulated  # noqa: F401
-from test_gushing import event  # noqa: F401
+from test_gushing import event, quick  # noqa: F401
 from test_heap import dropped_block
 
 from coupling.datasets import read_attributes, read_history, read_response
 from coupling.quality import quality, quality_attributes, quality_line
 from coupling.run import run
-from mpm.scene import Numerics
+from mpm import simulate
+from mpm.scene import Numerics, Stop
 from mpm.variables import MASS
 
 
@@ -52,9 +53,17 @@ def test_balances_while_material_gushes(event):  # noqa: F811
     # At most the scene's Courant number by the state before; the jet may speed up by a tenth within a step.
     courant = Numerics().courant
     assert 0.5 * courant <= last["largest_courant"] < 1.2 * courant
-    # PIC and MUSL take energy, never give any: 12 % of the work of stresses on this mesh, where the jet has just begun,
-    # 5 % with half the time step, 0.5 % without PIC.
-    assert 0 < last["transfer_loss"] < 0.2 * last["work_stress"]
+    # PIC and MUSL take energy, never give any.
+    assert last["transfer_loss"] > 0
+
+
+def test_transfers_take_little_energy_at_short_steps():
+    numerics = Numerics(courant=0.4)
+    scene = quick(stop=Stop(inflow_mass=60.0, time=2.0), numerics=numerics)
+    last = list(simulate(scene))[-1].balances
+    # Of the work of stresses, where the jet has just begun: 6 % on this mesh; 12 % at the default of 0.8, 0.5 % without
+    # PIC.
+    assert 0 < last["transfer_loss"] < 0.1 * last["work_stress"]
 
 
 def test_quality_is_in_the_file_the_log_and_the_line(simulated, tmp_path):  # noqa: F811
