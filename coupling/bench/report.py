@@ -57,7 +57,7 @@ def figure(data):
         axes[0, 0].axvline(data["reference_points_per_second"] / 1e6, color=GATE, label="reference loop")
         axes[0, 0].axvline(data["roofline_points_per_second"] / 1e6, color="0.3", ls="--", label="memory bound")
         axes[0, 0].set_xlabel("million point-steps per CPU second")
-        axes[0, 0].legend(loc="best")
+        axes[0, 0].legend(loc="lower right", fontsize=6)
         kernels = data["kernels"]
         axes[0, 1].barh(list(kernels), [1e9 * s for s in kernels.values()], color=NOW)
         axes[0, 1].set_xlabel("CPU time of a point-step [ns]")
