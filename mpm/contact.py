@@ -11,7 +11,7 @@ the four cases holds. Drag is implicit: no permeability limits the time step.
 
 from functools import cache
 
-from mpm.jit import inline_kernel, kernel
+from mpm.jit import inline_kernel, kernel_part
 from mpm.variables import (
     B_D,
     B_FLX,
@@ -58,7 +58,7 @@ def free_pair(b_s, b_l, ms, ml, mn, d):
     return vs, (b_l + d * vs) / (ml + d)
 
 
-@kernel
+@kernel_part
 def wall_normal(b_s, b_l, ms, ml, mn, d, dt):
     """Normal velocities (solid, liquid) and reactions (effective, water) at a wall [N per metre]."""
     r_l = -b_l / dt
@@ -77,7 +77,7 @@ def wall_normal(b_s, b_l, ms, ml, mn, d, dt):
     return vs, vl, 0.0, 0.0
 
 
-@kernel
+@kernel_part
 def stop_rows(i, next_row, nodes, mean):
     """No velocity at a node without mass, on none of its rows."""
     n_nodes = nodes.shape[0] - mean.shape[0]
@@ -91,7 +91,7 @@ def stop_rows(i, next_row, nodes, mean):
         r = next_row[r]
 
 
-@kernel
+@kernel_part
 def solve_nodes(
     first, last, which, next_row, level_of_row, begun, dt_of_level, sums, mean, gravity, density_liquid, fixed,
     contact_of_node, normal, active, friction, wall, nodes, status, impulse, ledger,
@@ -269,7 +269,7 @@ def solve_nodes(
     ledger[7] += reactions
 
 
-@kernel
+@kernel_part
 def solve_dry_nodes(
     first, last, which, next_row, level_of_row, begun, dt_of_level, sums, mean, gravity, density_liquid, fixed,
     contact_of_node, normal, active, friction, wall, nodes, status, impulse, ledger,
@@ -375,7 +375,7 @@ def solve_dry_nodes(
 def remap_kernel(wet):
     """Kernel `remap_nodes` for points with pore water or without."""
 
-    @kernel
+    @kernel_part
     def remap_nodes(
         first, last, which, next_row, level_of_row, finished, dt_of_level, momenta, sums, mean, fixed, contact_of_node,
         normal, active, wall, nodes, status,
@@ -461,7 +461,7 @@ def remap_kernel(wet):
     return remap_nodes
 
 
-@kernel
+@kernel_part
 def smooth_rates(first, last, which, means, momenta, sums, nodes):
     """Nodal means of the divergences and of the gradient of the projected pressure (Detournay & Dzik 2006).
 

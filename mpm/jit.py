@@ -14,17 +14,29 @@ FAST_MATH = {"contract", "nsz", "arcp"}
 # pass out by default; NUMBA_SLP_VECTORIZE in the environment decides where it is set.
 if "NUMBA_SLP_VECTORIZE" not in os.environ:
     numba.config.SLP_VECTORIZE = 1
-OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": FAST_MATH}
+# forceinline: kernels that call others are one piece of machine code with them. Were the others code of their own, the
+# process that compiles would call that, and those that load what it compiled the copies that come with the caller,
+# which were optimised once more: other bits.
+OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": FAST_MATH, "forceinline": True}
 FOLDER = kernel_folder({**OPTIONS, "fastmath": sorted(FAST_MATH), "slp_vectorize": bool(numba.config.SLP_VECTORIZE)})
 
 
 def kernel(function, **options):
     """Compile a function of arrays and numbers when it is first called, once for all processes."""
-    function.__qualname__ = variant_name(function)
-    compiled = numba.njit(**OPTIONS, **options)(function)
+    compiled = _compiled(function, **options)
     if FOLDER is not None:
         compiled._cache = KernelCache(function, FOLDER)
     return compiled
+
+
+def kernel_part(function):
+    """A kernel that only other kernels call: no machine code of its own, and nothing to keep."""
+    return _compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
+def _compiled(function, **options):
+    function.__qualname__ = variant_name(function)
+    return numba.njit(**OPTIONS, **options)(function)
 
 
 def inline_kernel(function):

@@ -77,17 +77,18 @@ class Levels:
         steps : int
             Steps of the coarsest level until then, all of one length; 1 where there is no such time.
         """
-        held = np.flatnonzero(points)
-        finest, coarsest = (held[0], held[-1]) if len(held) else (0, 0)
+        points = points.tolist()
+        held = [level for level, count in enumerate(points) if count > 0] or [0]
         best, least = None, math.inf
-        for top in range(finest, coarsest + 1):
-            periods = 1 << (np.clip(np.arange(self.count), finest, top) - finest).astype(np.int64)
-            steps = max(math.ceil(most / int(periods[-1]) - 1e-9), 1) if most < math.inf else 1
-            span = steps * int(periods[-1])  # in steps of the finest level
-            work = float((points * (span / periods)).sum()) / (1.0 if most < math.inf else span)
+        for top in range(held[0], held[-1] + 1):
+            periods = [1 << (min(max(level, held[0]), top) - held[0]) for level in range(self.count)]
+            steps = max(math.ceil(most / periods[-1] - 1e-9), 1) if most < math.inf else 1
+            span = steps * periods[-1]  # in steps of the finest level
+            work = sum(count * (span // period) for count, period in zip(points, periods, strict=True))
+            work /= 1 if most < math.inf else span
             if work <= least:
                 best, least = (periods, steps), work
-        return best
+        return np.array(best[0], np.int64), best[1]
 
     def ahead(self, periods):
         """How far the stress of elements that meet a finer level has to run ahead, in steps of the element.

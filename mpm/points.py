@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from mpm.jit import kernel
+from mpm.jit import kernel, kernel_part
 from mpm.transfer import map_kernel
 from mpm.variables import C_RETURNED, MASS, POINT_WIDTH, SXX, SYY, SZZ, X0, Y0, N, P, X, Y
 
@@ -167,35 +167,26 @@ def sort_by_element(element_of_point, n_elements, start, order, occupied):
 
 
 @kernel
-def cut_by_points(start, occupied, n_occupied, element_cuts, parts, smallest):
-    """Cut the occupied elements of all levels up to each one into parts of about as many points.
+def cut_by_points(start, occupied, n_occupied, element_cuts, cuts):
+    """Cut the occupied elements of each level into parts of about as many points.
 
     Parameters
     ----------
     element_cuts : (n_levels + 1,) int
         First element of each level.
-    parts, smallest : int
-        Fewer points than `smallest` stay in one part: the others are empty.
-
-    Returns
-    -------
-    cuts : (n_levels, parts + 1) int64
-        Places in the list of occupied elements.
-    points : (n_levels,) int64
+    cuts : (n_levels, n_parts + 1) int64
+        Written: places in the list of occupied elements.
     """
-    n_levels = element_cuts.size - 1
-    cuts, points = np.zeros((n_levels, parts + 1), np.int64), np.zeros(n_levels, np.int64)
     held = occupied[:n_occupied]
-    for level in range(n_levels):
-        edge = element_cuts[level + 1]
-        end = np.searchsorted(held, edge)
-        points[level] = start[edge]
-        for part in range(1, parts + 1):
-            cuts[level, part] = end
-            if part < parts and start[edge] >= smallest:
-                element = np.searchsorted(start, part * start[edge] // parts, side="right") - 1
-                cuts[level, part] = np.searchsorted(held, element)
-    return cuts, points
+    parts = cuts.shape[1] - 1
+    for level in range(cuts.shape[0]):
+        first, last = element_cuts[level], element_cuts[level + 1]
+        count = start[last] - start[first]
+        for part in range(parts):
+            sought = start[first] + part * count // parts
+            element = first + np.searchsorted(start[first : last + 1], sought, side="right") - 1
+            cuts[level, part] = np.searchsorted(held, element)
+        cuts[level, parts] = np.searchsorted(held, last)
 
 
 @kernel
@@ -227,6 +218,8 @@ def update_order(
             gone += 1
     touched = touched[:n_touched]
     touched.sort()
+    stayed = np.zeros((n_touched + 1, 2), np.int32)  # ranges of `order` between touched elements that stay in place
+    n_stayed = 0
     # elements outside of these keep their points where they are, unless some are gone
     lowest, highest = touched[0], n_elements if gone > 0 else touched[-1] + 1
     for e in range(lowest, highest):
@@ -244,9 +237,14 @@ def update_order(
         if e == last:
             continue
         last = e
-        for j in range(read, start[e]):
-            new_order[write] = order[j]
-            write += 1
+        if read == write:
+            stayed[n_stayed, 0], stayed[n_stayed, 1] = read, start[e]
+            n_stayed += 1
+            write = start[e]
+        else:
+            for j in range(read, start[e]):
+                new_order[write] = order[j]
+                write += 1
         read = start[e]
         while a < n_moved and element_of_point[moved_point[arriving[a]]] < e:
             a += 1
@@ -281,7 +279,12 @@ def update_order(
     elif change < 0:
         for k in range(after, n_occupied):
             occupied[k + change] = occupied[k]
-    for j in range(start[lowest], write):
+    copied = start[lowest]
+    for k in range(n_stayed):
+        for j in range(copied, stayed[k, 0]):
+            order[j] = new_order[j]
+        copied = stayed[k, 1]
+    for j in range(copied, write):
         order[j] = new_order[j]
     for e in range(lowest, highest):
         if new_start[e + 1] > 0:
@@ -296,7 +299,7 @@ def relocate_kernel(wet, tied):
     """Kernel `relocate` for points with pore water or without, on levels tied to each other or on one."""
     map_point = map_kernel(wet, tied)
 
-    @kernel
+    @kernel_part
     def relocate(
         left, n_left, element_of_point, points, soil_of_point, soils, density_liquid, rows, geometry, neighbours,
         nodes, wave_speed, volume, level_of_element, finished, sums, clamps, moved_point, moved_from,
@@ -334,11 +337,11 @@ def relocate_kernel(wet, tied):
             e = -2 - element_of_point[i]
             origin = e
             for _ in range(10000):
-                g = geometry[e]
-                dx = points[i, X] - g[4]
-                dy = points[i, Y] - g[5]
-                n1 = g[0] * dx + g[1] * dy
-                n2 = g[2] * dx + g[3] * dy
+                g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
+                dx = points[i, X] - geometry[e, 4]
+                dy = points[i, Y] - geometry[e, 5]
+                n1 = g1x * dx + g1y * dy
+                n2 = g2x * dx + g2y * dy
                 n0 = 1.0 - n1 - n2
                 worst = 0
                 low = n0
@@ -369,9 +372,9 @@ def relocate_kernel(wet, tied):
                 total = n0 + n1 + n2
                 n1 /= total
                 n2 /= total
-                det = g[0] * g[3] - g[1] * g[2]
-                points[i, X] = g[4] + (n1 * g[3] - n2 * g[1]) / det
-                points[i, Y] = g[5] + (n2 * g[0] - n1 * g[2]) / det
+                det = g1x * g2y - g1y * g2x
+                points[i, X] = geometry[e, 4] + (n1 * g2y - n2 * g1y) / det
+                points[i, Y] = geometry[e, 5] + (n2 * g1x - n1 * g2x) / det
                 clamps[C_RETURNED] += 1
                 break
             if tied and e >= 0 and level_of_element[e] > finished:

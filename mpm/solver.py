@@ -8,10 +8,32 @@ from types import SimpleNamespace
 import numpy as np
 
 from mpm import stages
-from mpm.contact import FIXED_X, FIXED_Y, MIRROR_X, remap_kernel, smooth_rates, solve_dry_nodes, solve_nodes
+from mpm.contact import FIXED_X, FIXED_Y, MIRROR_X, remap_kernel, solve_dry_nodes, solve_nodes
 from mpm.half_model import right_half, ring_factors, whole_ring, with_mirrored_points
 from mpm.levels import element_levels, sorted_by_level, tie
-from mpm.points import cut_by_points, fill, initial_stress, relocate_kernel, sort_by_element, update_order
+from mpm.long_step import (
+    ACTIVE,
+    BAD,
+    FOLLOW,
+    LARGEST_COURANT,
+    OCCUPIED,
+    POINT_STEPS,
+    RATES,
+    REMOVED_MASS,
+    SOLVE,
+    SUBSTEPS,
+    SUSPENDED,
+    Clock,
+    Cuts,
+    Ground,
+    Medium,
+    Net,
+    Tally,
+    Walls,
+    long_step_kernel,
+)
+from mpm.meeting import ABANDONED, MEETING_WIDTH
+from mpm.points import cut_by_points, fill, initial_stress, relocate_kernel, sort_by_element
 from mpm.spectrum import spectral_time_step
 from mpm.time_step import critical_time_step, dry_wave_speed, fast_wave_speed
 from mpm.transfer import advance_kernel, rates_kernel, update_kernel
@@ -30,7 +52,6 @@ from mpm.variables import (
     S_G,
     S_LAMBDA,
     SOIL_WIDTH,
-    V_GX,
     V_P,
     VLX,
     VLY,
@@ -54,7 +75,6 @@ ALMOST = 1.1  # a step shortened by less to meet an output time counts as limite
 # Of the spectral step over that of the altitude. Beyond, a few points resist nothing where they are: no estimate.
 MOST_OVER_ALTITUDE = 4.0
 SMALLEST_PARALLEL = 4000  # elements; below it a second thread costs more than it brings
-SMALLEST_CUT = 4000  # points, nodes or rows of some levels; fewer are not cut into parts, whatever the threads
 
 
 class RunFailed(RuntimeError):
@@ -96,10 +116,18 @@ class Solver:
         self.fixed[mesh.bottom] |= FIXED_X | FIXED_Y
         self.mirror_line = mesh.left if scene.is_half else mesh.left[:0]
         self.fixed[self.mirror_line] |= MIRROR_X
-        self.mirror_rows = np.flatnonzero(np.isin(self.levels.node_of_row, self.mirror_line))
+        mirrored = np.isin(self.levels.node_of_row, self.mirror_line)
+        self._mirrored = mirrored if scene.is_half else mirrored[:0]
         self._build_contact()
-        self._node_cuts = [_even(int(size)) for size in self.levels.node_cuts[1:]]
-        self._row_cuts = [_even(int(size)) for size in self.levels.row_cuts[1:]]
+        cuts = np.zeros((self.levels.count, PARTS + 1), np.int64)
+        self._cuts = Cuts(cuts, _cut_evenly(self.levels.node_cuts), _cut_evenly(self.levels.row_cuts))
+        self._meeting, self._counts, self._measures = (
+            np.zeros(MEETING_WIDTH, np.int64),
+            np.zeros(6, np.int64),
+            np.zeros(2),
+        )
+        self._limits, self._found = np.zeros((PARTS + 1, 2)), np.zeros((3, PARTS), np.int64)
+        self._used = np.zeros(0, np.int64)  # processor time of the passes: not measured
         self.start = np.zeros(m + 1, np.int32)
         self.order = np.zeros(len(self.points), np.int32)
         self.occupied = np.zeros(m, np.int32)
@@ -162,14 +190,16 @@ class Solver:
         scene = self.scene
         wet = scene.water is not None
         plastic = any(soil.model == "mohr-coulomb" for soil in scene.soils)
-        self._solve_nodes = solve_nodes if wet else solve_dry_nodes
         tied = self.levels.count > 1
-        self._advance_points = advance_kernel(wet, tied)
-        self._remap_nodes = remap_kernel(wet)
-        self._rates = rates_kernel(wet)
         dilatant = plastic and any(soil.dilatancy_angle > 0 for soil in scene.soils if soil.model != "elastic")
-        self._update = update_kernel(wet, plastic, scene.numerics.volumetric_smoothing, dilatant, tied)
-        self._relocate_points = relocate_kernel(wet, tied)
+        self._long_step = long_step_kernel(
+            solve_nodes if wet else solve_dry_nodes,
+            advance_kernel(wet, tied),
+            remap_kernel(wet),
+            rates_kernel(wet),
+            update_kernel(wet, plastic, scene.numerics.volumetric_smoothing, dilatant, tied),
+            relocate_kernel(wet, tied),
+        )
         self._water_density = scene.water.density if wet else 0.0
         self._water_modulus = scene.water.bulk_modulus if wet else 0.0
 
@@ -280,13 +310,7 @@ class Solver:
         self.n_occupied, self.n_active = sort_by_element(
             self.element_of_point, len(self.mesh.elements), self.start, self.order, self.occupied
         )
-        self._cut()
-
-    def _cut(self):
-        """Where the elements with points of all levels up to each one are cut into parts of as many points."""
-        self._element_cuts, self._points_up_to = cut_by_points(
-            self.start, self.occupied, self.n_occupied, self.levels.element_cuts, PARTS, SMALLEST_CUT
-        )
+        cut_by_points(self.start, self.occupied, self.n_occupied, self.levels.element_cuts, self._cuts.elements)
 
     def _sort_physically(self):
         inside = self.order[: self.n_active]
@@ -331,25 +355,38 @@ class Solver:
 
     # -- threads --------------------------------------------------------------------------------
 
-    def over_elements(self, kernel, *arguments, per_range=(), up_to=-1):
-        """Run a kernel over the occupied elements of levels up to `up_to`; returns the list of the ranges' results.
+    def over_elements(self, kernel, *arguments, per_range=()):
+        """Run a kernel over all occupied elements; returns the list of the ranges' results.
 
         Each range gets its own of the `per_range` arrays; the ranges do not depend on the number of threads.
         """
-        return self._over(self._element_cuts[up_to].tolist(), kernel, arguments, per_range)
+        first = [np.searchsorted(self.start, self.n_active * k // PARTS, side="right") - 1 for k in range(1, PARTS)]
+        held = self.occupied[: self.n_occupied]
+        return self._over([0, *np.searchsorted(held, first).tolist(), self.n_occupied], kernel, arguments, per_range)
 
-    def over_nodes(self, kernel, *arguments, per_range=(), up_to=-1):
-        """Run a kernel over the list of nodes whose finest level is at most `up_to`, as `over_elements`."""
-        return self._over(self._node_cuts[up_to], kernel, arguments, per_range)
+    def over_nodes(self, kernel, *arguments, per_range=()):
+        """Run a kernel over all nodes, as `over_elements`."""
+        return self._over(np.linspace(0, len(self.mesh.nodes), PARTS + 1).astype(int), kernel, arguments, per_range)
 
     def _over(self, cuts, kernel, arguments, per_range):
         def call(r):
             return kernel(cuts[r], cuts[r + 1], *arguments, *(a[r] for a in per_range))
 
-        ranges = range(len(cuts) - 1 if cuts[1] < cuts[-1] else 1)
-        if self._pool is None or len(ranges) == 1:
-            return [call(r) for r in ranges]
-        others = [self._pool.submit(call, r) for r in ranges[1:]]
+        return self._by_threads(call, PARTS)
+
+    def together(self, kernel, *arguments):
+        """Run a kernel once by every thread: kernel(thread, threads, meeting, *arguments), see `mpm.meeting`."""
+        try:
+            self._by_threads(lambda thread: kernel(thread, self.threads, self._meeting, *arguments), self.threads)
+        except BaseException:  # an interrupt, before this thread has begun: the other must not wait
+            self._meeting[ABANDONED] = 1
+            raise
+
+    def _by_threads(self, call, count):
+        """Results of `call` for the numbers from 0 to below `count`, some at the same time."""
+        if self._pool is None:
+            return [call(r) for r in range(count)]
+        others = [self._pool.submit(call, r) for r in range(1, count)]
         return [call(0), *(o.result() for o in others)]
 
     # -- information ----------------------------------------------------------------------------
@@ -373,7 +410,7 @@ class Solver:
         """Time step of the smallest elements that hold points [s] and the name of what limits it."""
         if not self._mapped:
             self.map_points()
-        limits = [*self._limits, (self.longest_step, 0.0)]
+        limits = [*self._limits.tolist(), [self.longest_step, 0.0]]
         dt, limit = critical_time_step(limits, self.limit_speed, self.scene.numerics.courant)
         return dt * self._finest_step, limit
 
@@ -394,37 +431,15 @@ class Solver:
 
     # -- stages ---------------------------------------------------------------------------------
 
-    def _element_rates(self, up_to=-1):
-        self.over_elements(
-            self._rates, self.occupied, self.levels.rows, self.geometry, self.nodes, self.volume, self.rates,
-            per_range=(self.nodal_means,), up_to=up_to,
-        )  # fmt: skip
-        self._over(
-            self._row_cuts[up_to], smooth_rates,
-            (self.levels.row_order, self.nodal_means, self.momenta, self.sums, self.nodes), (),
-        )  # fmt: skip
-        self.nodes[self.mirror_rows, V_GX] = 0.0
-
     def map_points(self):
         """Sum the points at the nodes without advancing anything; sets the limits of the time step."""
         inside = self.element_of_point >= 0
         element, volume = self.element_of_point[inside], self._volumes()[inside]
         self.volume[:, 0] = np.bincount(element, volume, len(self.volume))
         self.volume[:, 1] = np.bincount(element, volume * (self.points[inside, P] > 0), len(self.volume))
-        self._element_rates()
-        outcome = self._update_points(np.zeros(self.levels.count), False)
-        self._limits = [o[3:] for o in outcome]
-        self._follow(outcome, self.levels.count - 1)  # points that were put onto edges
+        top, still = np.array([self.levels.count - 1]), np.zeros(self.levels.count)
+        self._run(Clock(still, still, top, top, 0.0), RATES, FOLLOW, advance=False)
         self._mapped = True
-
-    def _update_points(self, dt_of_level, advance, up_to=-1):
-        return self.over_elements(
-            self._update, self.occupied, self.start, self.order, self.points, self.soil_of_point, self.soils,
-            self._water_density, self._water_modulus, self.levels.rows, self.geometry, self.nodes, self.rates,
-            self.volume, self.levels.of_element, dt_of_level, self.ahead, advance, self.limit_speed,
-            self.element_of_point,
-            per_range=(self.clamps, self.sums, self._left), up_to=up_to,
-        )  # fmt: skip
 
     def relax(self, progress=None):
         """Drained initial equilibrium; returns (steps, residual) and leaves the reactions in `impulse`."""
@@ -467,8 +482,9 @@ class Solver:
         dt_of_level = smallest * periods
         if not np.array_equal(periods, self._periods):
             self._periods, self.ahead[:] = periods, self.levels.ahead(periods)
-        for k in range(count):
-            self._substep(dt_of_level, _last_multiple(periods, k), _last_multiple(periods, k + 1))
+        begun, finished = _last_multiples(periods, np.arange(count)), _last_multiples(periods, np.arange(1, count + 1))
+        flip_of_level = np.exp(-self.scene.numerics.pic_rate * dt_of_level)
+        self._advance(Clock(dt_of_level, flip_of_level, begun, finished, smallest / self._finest_step))
         self.time += smallest * count
         self.long_step_count += 1
         if self.long_step_count % STEPS_BETWEEN_SORTS == 0:
@@ -477,71 +493,54 @@ class Solver:
             self._update_wave_speed()
         return smallest * count, limit
 
-    def _substep(self, dt_of_level, begun, finished):
-        """One step of the finest level: levels up to `begun` begin their own now, those up to `finished` end it."""
-        numerics, density, levels = self.scene.numerics, self._water_density, self.levels
-        smallest = float(dt_of_level[0]) / self._finest_step  # of level 0, as the limits
-        layout = (self.occupied, self.start, self.order, self.points, self.soil_of_point, self.soils)
-        nodes = (levels.nodes, levels.next_row, levels.of_row)
-        wall = (self.fixed, self.contact_of_node, self.normal, self.active)
+    def _advance(self, clock):
+        """All passes of a long step."""
+        if self.moving is not None:  # all levels are one
+            self.moving.advance(self.sums, float(clock.dt_of_level[0]), self.normal, self.active, self.friction)
+        self._run(clock, SOLVE, FOLLOW)
 
-        if self.moving is not None:
-            self.moving.advance(self.sums, float(dt_of_level[0]), self.normal, self.active, self.friction)
-        self.over_nodes(
-            self._solve_nodes, *nodes, begun, dt_of_level, self.sums, self.tied_means, self.scene.gravity, density,
-            *wall, self.friction, self.wall, self.nodes, self.status, self.impulse, per_range=(self.ledger,),
-            up_to=begun,
+    def _run(self, clock, first_pass, last_pass, advance=True):
+        """Some passes (`mpm.long_step.PASSES`) of all substeps of a long step, by all threads."""
+        levels, counts = self.levels, self._counts
+        counts[:] = self.n_occupied, self.n_active, self.suspended, -1, 0, 0
+        self._measures[:] = self.largest_courant, self.removed_mass
+        arguments = (
+            first_pass, last_pass, advance,
+            Ground(
+                self.occupied, self.start, self.order, self.points, self.element_of_point, self.soil_of_point,
+                self.soils,
+            ),
+            Net(
+                levels.rows, self.geometry, self.neighbours, levels.of_element, levels.element_cuts, self.ahead,
+                self.volume, self.rates, levels.nodes, levels.next_row, levels.of_row, levels.row_order,
+                self._mirrored, self.nodes, self.tied_means, self.status, self.sums, self.momenta, self.nodal_means,
+            ),
+            Walls(
+                self.fixed, self.contact_of_node, self.normal, self.active, self.friction, self.wall, self.impulse
+            ),
+            self._cuts, clock,
+            Medium(
+                self.scene.gravity, self._water_density, self._water_modulus, self.scene.numerics.pressure_filter,
+                self.limit_speed,
+            ),
+            Tally(
+                counts, self._measures, self._limits, *self._found, self.clamps, self.ledger, self._left,
+                *self._moved, *self._spare, self._used,
+            ),
         )  # fmt: skip
-        self.over_elements(
-            self._advance_points, *layout, density, levels.rows, self.geometry, self.nodes, self.tied_means,
-            levels.of_element, dt_of_level, np.exp(-numerics.pic_rate * dt_of_level), numerics.pressure_filter,
-            per_range=(self.momenta,), up_to=finished,
-        )  # fmt: skip
-        self.over_nodes(
-            self._remap_nodes, *nodes, finished, dt_of_level, self.momenta, self.sums, self.tied_means, *wall,
-            self.wall, self.nodes, self.status, up_to=finished,
-        )  # fmt: skip
-        self._element_rates(finished)
-        outcome = self._update_points(dt_of_level, True, finished)
-        self._check(outcome)
-        self._limits = [o[3:] for o in outcome]
-        self.largest_courant = max(self.largest_courant, smallest / min(self._limits)[0])
-        self.suspended = sum(o[2] for o in outcome)
-        self.point_steps += int(self._points_up_to[finished])
-        self.step_count += 1
-        self._follow(outcome, finished)
-
-    def _follow(self, outcome, finished):
-        """Find the elements of the points that left theirs."""
-        n_left = np.zeros(PARTS, np.int64)
-        n_left[: len(outcome)] = [o[0] for o in outcome]
-        if n_left.any():
-            self._relocate(n_left, finished)
-
-    def _relocate(self, n_left, finished):
-        n_moved, removed, *limit = self._relocate_points(
-            self._left, n_left, self.element_of_point, self.points, self.soil_of_point, self.soils, self._water_density,
-            self.levels.rows, self.geometry, self.neighbours, self.nodes, self.limit_speed, self.volume,
-            self.levels.of_element, finished, self.sums[0], self.clamps[0], *self._moved,
-        )  # fmt: skip
-        self._limits.append(tuple(limit))
-        if removed:
-            self.removed_mass = float(np.sum(self.points[self.element_of_point == -1, MASS]))
-        if n_moved:
-            self.n_occupied, self.n_active = update_order(
-                self.element_of_point, *self._moved, n_moved, self.start, self.order, self.occupied, self.n_occupied,
-                *self._spare,
-            )  # fmt: skip
-            self._cut()
-
-    def _check(self, outcome):
-        bad = [o[1] for o in outcome if o[1] >= 0]
-        if bad:
+        self.together(self._long_step, *arguments)
+        self.n_occupied, self.n_active, self.suspended = (int(counts[k]) for k in (OCCUPIED, ACTIVE, SUSPENDED))
+        self.largest_courant = float(self._measures[LARGEST_COURANT])
+        self.removed_mass = float(self._measures[REMOVED_MASS])
+        if counts[BAD] >= 0:
             raise RunFailed(
                 "a material point became non-finite (velocity, stress or pore pressure)",
                 self.time,
-                self.points[bad[0], X : Y + 1],
+                self.points[counts[BAD], X : Y + 1],
             )
+        if advance:
+            self.step_count += int(counts[SUBSTEPS])
+            self.point_steps += int(counts[POINT_STEPS])
 
     # -- measures -------------------------------------------------------------------------------
 
@@ -662,13 +661,14 @@ class Solver:
         return result
 
 
-def _even(size):
-    return np.linspace(0, size, PARTS + 1 if size >= SMALLEST_CUT else 2).astype(int).tolist()
+def _cut_evenly(cuts):
+    """Cut each range between two `cuts` (n + 1,) into parts of one size: (n, PARTS + 1) int64."""
+    return np.linspace(cuts[:-1], cuts[1:], PARTS + 1, axis=1).astype(np.int64)
 
 
-def _last_multiple(periods, k):
-    """The coarsest level whose period divides k."""
-    return int(np.flatnonzero(k % periods == 0)[-1])
+def _last_multiples(periods, numbers):
+    """For each number the coarsest level whose period divides it, as all shorter ones then do: (n,) int64."""
+    return (numbers[:, None] % periods == 0).sum(axis=1) - 1
 
 
 def soil_table(scene):

@@ -35,7 +35,7 @@ def solver_state(solver):
     state = {name: getattr(solver, name) for name in (*ARRAYS, *NUMBERS, "gate_open")}
     state["mode"] = np.zeros(0) if solver.mode is None else solver.mode
     state["mapped"] = solver._mapped
-    state["limits"] = np.array(solver._limits if solver._mapped else [], float).reshape(-1, 2)
+    state["limits"] = solver._limits.copy() if solver._mapped else np.zeros((0, 2))
     return state
 
 
@@ -66,4 +66,4 @@ def restore_solver(solver, state):
     solver._sort()
     solver._mapped = bool(state["mapped"])
     if solver._mapped:
-        solver._limits = [(float(limit), float(speed)) for limit, speed in state["limits"]]
+        solver._limits[:] = state["limits"]

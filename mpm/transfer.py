@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 
-from mpm.jit import index, inline_kernel, kernel
+from mpm.jit import index, inline_kernel, kernel_part
 from mpm.materials.mohr_coulomb import mohr_coulomb
 from mpm.variables import (
     B_D,
@@ -101,7 +101,7 @@ def on_element(n0, n1, n2):
 def advance_kernel(wet, tied):
     """Kernel `advance_points` for points with pore water or without, on levels tied to each other or on one."""
 
-    @kernel
+    @kernel_part
     def advance_points(
         first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, rows, geometry, nodes,
         mean, level_of_element, dt_of_level, flip_of_level, pressure_filter, sums,
@@ -216,7 +216,7 @@ def advance_kernel(wet, tied):
 def rates_kernel(wet):
     """Kernel `element_rates` for points with pore water or without."""
 
-    @kernel
+    @kernel_part
     def element_rates(first, last, occupied, rows, geometry, nodes, volume, rates, sums):
         """Strain rates, spin and divergences of the remapped velocities, constant in an element [1/s].
 
@@ -267,7 +267,7 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
     and so does the stress that follows; smoothed rates give no resistance to the motions that this drives, which grow.
     """
 
-    @kernel
+    @kernel_part
     def update_points(
         first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, bulk_liquid, rows,
         geometry, nodes, rates, volume, level_of_element, dt_of_level, ahead, advance, wave_speed, element_of_point,
@@ -569,7 +569,7 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
 def map_kernel(wet, tied):
     """Kernel `map_point` for points with pore water or without; with levels a point may wait outside its element."""
 
-    @kernel
+    @kernel_part
     def map_point(row, soil, density_liquid, corner, geometry, nodes, sums):
         """Add one point to the rows of the element that holds it, as `update_points` does for those that stay.
 

@@ -25,9 +25,9 @@ for factor in map(float, sys.argv[1:]):
     print("compiled" if scale.stats.cache_misses else "kept")
 """
 EVENT = """
-import numpy as np
+import hashlib, inspect
 import mpm
-import mpm.contact, mpm.points, mpm.stages, mpm.transfer
+import mpm.contact, mpm.meeting, mpm.points, mpm.spectrum, mpm.stages
 import sys; sys.path.insert(0, "tests")
 from small_event import small_scene
 scene = small_scene().mpm
@@ -36,9 +36,9 @@ solver.relax()
 solver.open_gate()
 for _ in range(40):
     solver.step()
-solver._relocate(np.zeros(2, np.int64), solver.levels.count - 1)
-kernels = [v for m in (mpm.contact, mpm.points, mpm.stages, mpm.transfer) for v in vars(m).values()]
-kernels += [v for v in vars(solver).values()]
+kernels = [v for m in (mpm.contact, mpm.meeting, mpm.points, mpm.spectrum, mpm.stages) for v in vars(m).values()]
+kernels += [solver._long_step, *inspect.getclosurevars(solver._long_step.py_func).nonlocals.values()]
+kernels += [mpm.spectrum.krylov_kernel(True)]
 kernels = {k.py_func.__qualname__: k for k in kernels if hasattr(k, "py_func")}
 print(len(kernels), max(len(k.signatures) for k in kernels.values()),
       *(name for name, k in kernels.items() if k.stats.cache_misses))
@@ -100,3 +100,27 @@ def test_every_kernel_is_compiled_once_for_all_processes_and_for_one_signature()
     assert compiled == []
     assert int(count) > 10
     assert int(signatures) == 1
+
+
+def test_kernels_that_kernels_call_are_one_piece_of_machine_code_with_them(program, tmp_path):
+    # As code of their own they would run as first optimised in the process that compiles them, and as optimised once
+    # more with their caller in those that load it: other bits. The inner one here is too long to be written out unasked.
+    terms = "\n        ".join(f"x = factor * x + {k}.0 / (x * x + {k + 1}.0)" for k in range(150))
+    (tmp_path / "variants.py").write_text(f"""
+from mpm.jit import kernel
+def kernels(factor):
+    @kernel
+    def inner(x):
+        {terms}
+        return x
+    @kernel
+    def outer(x):
+        return inner(x) + inner(x + 1.0)
+    return outer
+outer = kernels(0.5)
+outer(1.0)
+code = outer.inspect_llvm(outer.signatures[0])
+assert "outer" in code
+print("calls" if any(" call " in line and "inner" in line for line in code.splitlines()) else "alone")
+""")
+    assert printed(program()) == ["alone"]

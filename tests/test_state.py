@@ -14,22 +14,16 @@ from mpm.state import ARRAYS, NUMBERS
 BUILT = {
     "scene", "mesh", "soils", "parts", "geometry", "neighbours", "fixed", "contact_of_node", "n_contact", "normal",
     "active", "friction", "lining", "threads", "initial_grain_mass", "initial", "_normal_open", "_active_open",
-    "_closed", "_pool", "_node_cuts", "_solve_nodes", "_advance_points", "_remap_nodes", "_rates", "_update",
-    "_relocate_points", "_water_density", "_water_modulus", "start", "order", "occupied", "n_occupied", "n_active",
-    "_element_cuts", "_row_cuts", "_points_up_to", "levels",
-    "copies", "mirror_line", "mirror_rows",
+    "_closed", "_pool", "_long_step", "_water_density", "_water_modulus", "start", "order", "occupied", "n_occupied",
+    "n_active", "_cuts", "levels", "copies", "mirror_line", "_mirrored", "_meeting", "_used",
     "moving", "wall", "ahead", "_periods",
 }  # fmt: skip
 #: Written by each step before it is read.
-SCRATCH = {"tied_means", "momenta", "nodal_means", "status", "rates", "_spare", "_moved", "_left"}
+SCRATCH = {
+    "tied_means", "momenta", "nodal_means", "status", "rates", "_spare", "_moved", "_left", "_counts", "_measures",
+    "_found",
+}  # fmt: skip
 STATE = {*ARRAYS, *NUMBERS, "gate_open", "_mapped", "_limits", "mode"}
-
-
-@pytest.fixture(scope="module", autouse=True)
-def small_ranges_are_cut():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(mpm.solver, "SMALLEST_CUT", 0)  # else a second thread would have nothing to do
-        yield
 
 
 @pytest.fixture(scope="module", params=["resolved", "sink", "altitude", "one step for all", "elastic lining"])

@@ -37,7 +37,8 @@ def bytes_per_point_step(solver):
 def operations_per_point_step(solver):
     """Floating-point operations in the loops over points of a step's kernels: dict of kernel name to count."""
     counts = {}
-    for kernel in (solver._advance_points, solver._update):
+    kernels = inspect.getclosurevars(solver._long_step.py_func).nonlocals
+    for kernel in (kernels["advance_points"], kernels["update_points"]):
         tree = ast.parse(textwrap.dedent(inspect.getsource(kernel.py_func)))
         function = next(node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef))
         loops = [node for node in ast.walk(function) if isinstance(node, ast.For) and _over_points(node)]

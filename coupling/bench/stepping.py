@@ -2,6 +2,10 @@
 
 import time as clock
 
+import numpy as np
+
+from mpm.long_step import PASSES
+
 SECONDS_OF_WARM_UP = 0.5
 
 
@@ -53,42 +57,37 @@ def rate(solver, seconds):
 
 
 #: Methods of the solver that a step calls only now and then, and what they are called in the table.
-OCCASIONAL = {"_relocate": "order after relocation", "_sort_physically": "sorting", "_update_wave_speed": "spectrum"}
+OCCASIONAL = {"_sort_physically": "sorting", "_update_wave_speed": "spectrum"}
 
 
 def kernel_times(solver, seconds):
-    """Processor time of each kernel per point-step [s], the rest of a step as "python", of a solver on one thread.
-
-    Kernels are timed by the name of their function, so this follows whatever a step calls.
-    """
-    used, inner = {}, [0.0]
+    """Processor time of each pass per point-step [s], the rest of a step as "python", of a solver on one thread."""
+    occasional = dict.fromkeys(OCCASIONAL.values(), 0.0)
+    inner = [0.0]
 
     def measured(function, name):
-        def call(*arguments, **options):
+        def call():
             inner.append(0.0)
             begin = clock.process_time()
-            result = function(*arguments, **options)
+            function()
             spent = clock.process_time() - begin
-            used[name] = used.get(name, 0.0) + spent - inner.pop()
+            occasional[name] += spent - inner.pop()
             inner[-1] += spent
-            return result
 
         return call
 
-    def over(cuts, kernel, arguments, per_range, plain=solver._over):
-        return plain(cuts, measured(kernel, kernel.py_func.__name__), arguments, per_range)
-
-    relocate = solver._relocate_points
-    solver._over, solver._relocate_points = over, measured(relocate, "relocate")
     for method, name in OCCASIONAL.items():
         setattr(solver, method, measured(getattr(solver, method), name))
+    solver._used = np.zeros(len(PASSES), np.int64)
     points = solver.point_steps
     try:
         _, total, _ = timed(solver.step, seconds)
     finally:
-        solver._relocate_points = relocate
-        for name in ("_over", *OCCASIONAL):
-            delattr(solver, name)
+        passes, solver._used = solver._used, solver._used[:0]
+        for method in OCCASIONAL:
+            delattr(solver, method)
+    used = {name: 1e-6 * int(spent) for name, spent in zip(PASSES, passes, strict=True)}
+    used |= {name: spent for name, spent in occasional.items() if spent > 0}
     used["python"] = total - sum(used.values())
     done = solver.point_steps - points
     return {name: spent / done for name, spent in sorted(used.items(), key=lambda item: -item[1])}

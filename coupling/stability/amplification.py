@@ -119,7 +119,7 @@ class SteppedAt(Solver):
     def step_of(self, dt):
         """Map the points as they are and advance by dt [s], whatever the critical time step."""
         self.map_points()
-        self._limits, self.longest_step = [(dt, 0.0)], math.inf
+        self._limits[:], self.longest_step = (dt, 0.0), math.inf
         return self.step(dt)
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from mpm.contact import FIXED_X, FIXED_Y
+from mpm.long_step import ADVANCE, FOLLOW, RATES, REMAP, SOLVE
 from mpm.scene import Scene
 from mpm.solver import Solver
 from mpm.variables import V_DLX, V_DLY, V_DSX, V_DSY, V_LX, V_LY, V_MS, V_SX, V_SY
@@ -37,43 +38,36 @@ class DrivenSolver(Solver):
         self.driven, self.velocity = np.zeros(shape, bool), np.zeros(shape)
         self.driven_liquid, self.velocity_liquid = np.zeros(shape, bool), np.zeros(shape)
         self.force, self.reaction = np.zeros(shape), np.zeros(shape)
-        solve, remap = self._solve_nodes, self._remap_nodes
 
-        def driven_solve(first, last, which, next_row, level_of_row, begun, dt_of_level, *rest):
-            solve(first, last, which, next_row, level_of_row, begun, dt_of_level, *rest)
-            self._drive(slice(first, last), float(dt_of_level[0]))
+    def _advance(self, clock):
+        self._run(clock, SOLVE, SOLVE)
+        self._drive(float(clock.dt_of_level[0]))
+        self._run(clock, ADVANCE, REMAP)
+        moved = self.driven & (self.nodes[:, V_MS] > 0)[:, None]
+        self.nodes[:, V_SX : V_SY + 1][moved] = self.velocity[moved]
+        self.nodes[:, V_LX : V_LY + 1][self.driven_liquid] = self.velocity_liquid[self.driven_liquid]
+        self._run(clock, RATES, FOLLOW)
 
-        def driven_remap(first, last, *rest):
-            remap(first, last, *rest)
-            part = slice(first, last)
-            row = self.nodes[part]
-            moved = self.driven[part] & (row[:, V_MS] > 0)[:, None]
-            row[:, V_SX : V_SY + 1][moved] = self.velocity[part][moved]
-            moved = self.driven_liquid[part]
-            row[:, V_LX : V_LY + 1][moved] = self.velocity_liquid[part][moved]
-
-        self._solve_nodes, self._remap_nodes = driven_solve, driven_remap
-
-    def _drive(self, part, dt):
-        row = self.nodes[part]
+    def _drive(self, dt):
+        row = self.nodes
         mass = row[:, V_MS : V_MS + 1]
         full = mass > 0
         velocity, change = row[:, V_SX : V_SY + 1], row[:, V_DSX : V_DSY + 1]
-        free = (np.column_stack([self.fixed[part] & FIXED_X, self.fixed[part] & FIXED_Y]) == 0) & full
-        push = np.where(free, dt * self.force[part] / np.where(full, mass, 1.0), 0.0)
+        free = (np.column_stack([self.fixed & FIXED_X, self.fixed & FIXED_Y]) == 0) & full
+        push = np.where(free, dt * self.force / np.where(full, mass, 1.0), 0.0)
         velocity += push
         change += push
         if self.damping > 0:
-            drag = np.where(free & ~self.driven[part], self.damping * np.abs(change) * np.sign(velocity), 0.0)
+            drag = np.where(free & ~self.driven, self.damping * np.abs(change) * np.sign(velocity), 0.0)
             velocity -= drag
             change -= drag
-        moved = self.driven[part] & full
-        jump = np.where(moved, self.velocity[part] - velocity, 0.0)
-        self.reaction[part] = mass * jump / dt
+        moved = self.driven & full
+        jump = np.where(moved, self.velocity - velocity, 0.0)
+        self.reaction[:] = mass * jump / dt
         velocity += jump
         change += jump
-        moved = self.driven_liquid[part] & full
-        jump = np.where(moved, self.velocity_liquid[part] - row[:, V_LX : V_LY + 1], 0.0)
+        moved = self.driven_liquid & full
+        jump = np.where(moved, self.velocity_liquid - row[:, V_LX : V_LY + 1], 0.0)
         row[:, V_LX : V_LY + 1] += jump
         row[:, V_DLX : V_DLY + 1] += jump
 
