@@ -16,6 +16,7 @@ elements with steps of their own after Lew, Marsden, Ortiz & West (2003), Asynch
 import copy
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +60,11 @@ class Levels:
     def count(self):
         """Number of levels."""
         return len(self.element_cuts) - 1
+
+    @cached_property
+    def stiffened(self):
+        """Factor by which its own step makes an element stiffer for a spectrum in steps of level 0: (n_elements,)."""
+        return 4.0**self.of_element * (1 + 2 * self.ahead(2 ** np.arange(self.count)))
 
     def plan(self, points, most):
         """How the levels step on the way to the next output time, at the least work.

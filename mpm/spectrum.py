@@ -346,11 +346,10 @@ class Spectrum:
         self.step_of_node = 2.0 ** levels.of_row[:n_nodes]
         held, nodal = np.empty((solver.n_occupied, ELEMENT_WIDTH)), np.zeros((parts, n_nodes, 4))
         row_volume = np.zeros((parts, n_rows))
-        ahead = levels.ahead(2 ** np.arange(levels.count))
         solver.over_elements(
             sum_points, solver.occupied, solver.start, solver.order, solver.points, solver.soil_of_point, solver.soils,
             solver._water_density, solver._water_modulus, mesh.elements, levels.rows, solver.geometry,
-            4.0**levels.of_element * (1 + 2 * ahead), held, per_range=(nodal, row_volume),
+            levels.stiffened, held, per_range=(nodal, row_volume),
         )  # fmt: skip
         nodal, row_volume = nodal.sum(axis=0), row_volume.sum(axis=0)
         fixed = solver.fixed[:, None] & np.array([FIXED_X, FIXED_Y], np.int8)
@@ -389,21 +388,27 @@ class Spectrum:
     def largest(self, dt, start=None):
         """Largest eigenvalue [1/s2] with drag over dt [s], and its mode; start: a guess of the mode."""
         # alone, a mode does not feel another that has grown where it is zero
-        anywhere = np.random.default_rng(0).standard_normal(self.basis[0].size)
-        start = anywhere if start is None else start / _norm(start) + anywhere / _norm(anywhere)
+        anywhere = _anywhere(self.basis[0].size)
+        start = anywhere if start is None else start / _norm(start) + anywhere
         for _ in range(MOST_RESTARTS):
             values, vectors, error = self._krylov(dt, start)
             best = int(np.argmax(np.abs(values)))
             value = float(np.abs(values[best]))
             if value == 0.0:
                 return 0.0, None
-            # sums, no dot products: those of BLAS depend on its number of threads in the last bits
-            weights = np.real(vectors[:, best])
-            mode = sum(weight * vector for weight, vector in zip(weights, self.basis, strict=False)).ravel()
+            # einsum, no dot products: those of BLAS depend on its number of threads in the last bits
+            mode = np.einsum("k,kix->ix", np.real(vectors[:, best]), self.basis[: len(vectors)]).ravel()
             if error[best] <= TOLERANCE * value:
                 return value, mode
             start = mode
         return math.inf, None
+
+
+@cache
+def _anywhere(size):
+    """A unit vector that no mode is at right angles to."""
+    vector = np.random.default_rng(0).standard_normal(size)
+    return vector / _norm(vector)
 
 
 def _norm(vector):

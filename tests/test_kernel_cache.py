@@ -104,7 +104,7 @@ def test_every_kernel_is_compiled_once_for_all_processes_and_for_one_signature()
 
 def test_kernels_that_kernels_call_are_one_piece_of_machine_code_with_them(program, tmp_path):
     # As code of their own they would run as first optimised in the process that compiles them, and as optimised once
-    # more with their caller in those that load it: other bits. The inner one here is too long to be written out unasked.
+    # more with their caller in those that load it: other bits. This one is too long to be written out unasked.
     terms = "\n        ".join(f"x = factor * x + {k}.0 / (x * x + {k + 1}.0)" for k in range(150))
     (tmp_path / "variants.py").write_text(f"""
 from mpm.jit import kernel
