@@ -1,7 +1,7 @@
 """One long step in compiled code: all its substeps, pass by pass, by threads that meet between the passes.
 
-Every thread calls the same kernel and does its parts of each pass; what must not be done twice is done by the first.
-The parts are those of the mesh, whatever the number of threads, and so are the bits.
+Every thread calls the same kernel and shares the passes with the others (`mpm.meeting`). The parts are those of the
+mesh, whatever the number of threads, and so are the bits.
 """
 
 from functools import cache
@@ -12,7 +12,7 @@ from numba import types
 
 from mpm.contact import smooth_rates
 from mpm.jit import kernel, kernel_part
-from mpm.meeting import meet
+from mpm.meeting import next_part, next_stage, take_part
 from mpm.points import cut_by_points, update_order
 from mpm.variables import MASS, V_GX
 
@@ -174,14 +174,15 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
 
     @kernel
     def long_step(
-        thread, threads, meeting, first_pass, last_pass, advance, ground, net, walls, cuts, clock, medium, tally
+        thread, meeting, stage, first_pass, last_pass, advance, ground, net, walls, cuts, clock, medium, tally
     ):  # fmt: skip
-        """Do the parts of `thread` in a range of passes of all substeps; `advance` False maps the points only."""
+        """Do what other threads leave of a range of passes of all substeps; `advance` False maps the points only."""
         parts, mark = net.sums.shape[0], processor_time()
         for k in range(clock.begun.size):
             begun, finished = clock.begun[k], clock.finished[k]
             if first_pass <= SOLVE:
-                for part in range(thread, parts, threads):
+                part = take_part(meeting, stage, thread, parts)
+                while part >= 0:
                     for level in range(begun + 1):
                         solve_nodes(
                             cuts.nodes[level, part], cuts.nodes[level, part + 1], net.which_node, net.next_row,
@@ -189,10 +190,12 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
                             medium.density_liquid, walls.fixed, walls.contact_of_node, walls.normal, walls.active,
                             walls.friction, walls.velocity, net.nodes, net.status, walls.impulse, tally.ledger[part],
                         )  # fmt: skip
-                meet(meeting, threads)
+                    part = next_part(meeting, stage, thread, parts)
+                stage = next_stage(meeting, stage, parts)
                 mark = lap(tally.used, SOLVE, thread, mark)
             if first_pass <= ADVANCE <= last_pass:
-                for part in range(thread, parts, threads):
+                part = take_part(meeting, stage, thread, parts)
+                while part >= 0:
                     for level in range(finished + 1):
                         advance_points(
                             cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, ground.start,
@@ -200,10 +203,12 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
                             net.rows, net.geometry, net.nodes, net.tied_means, net.level_of_element,
                             clock.dt_of_level, clock.flip_of_level, medium.pressure_filter, net.momenta[part],
                         )  # fmt: skip
-                meet(meeting, threads)
+                    part = next_part(meeting, stage, thread, parts)
+                stage = next_stage(meeting, stage, parts)
                 mark = lap(tally.used, ADVANCE, thread, mark)
             if first_pass <= REMAP <= last_pass:
-                for part in range(thread, parts, threads):
+                part = take_part(meeting, stage, thread, parts)
+                while part >= 0:
                     for level in range(finished + 1):
                         remap_nodes(
                             cuts.nodes[level, part], cuts.nodes[level, part + 1], net.which_node, net.next_row,
@@ -211,19 +216,23 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
                             walls.fixed, walls.contact_of_node, walls.normal, walls.active, walls.velocity, net.nodes,
                             net.status,
                         )  # fmt: skip
-                meet(meeting, threads)
+                    part = next_part(meeting, stage, thread, parts)
+                stage = next_stage(meeting, stage, parts)
                 mark = lap(tally.used, REMAP, thread, mark)
             if first_pass <= RATES <= last_pass:
-                for part in range(thread, parts, threads):
+                part = take_part(meeting, stage, thread, parts)
+                while part >= 0:
                     for level in range(finished + 1):
                         element_rates(
                             cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, net.rows,
                             net.geometry, net.nodes, net.volume, net.rates, net.nodal_means[part],
                         )  # fmt: skip
-                meet(meeting, threads)
+                    part = next_part(meeting, stage, thread, parts)
+                stage = next_stage(meeting, stage, parts)
                 mark = lap(tally.used, RATES, thread, mark)
             if first_pass <= SMOOTH <= last_pass:
-                for part in range(thread, parts, threads):
+                part = take_part(meeting, stage, thread, parts)
+                while part >= 0:
                     for level in range(finished + 1):
                         first, last = cuts.rows[level, part], cuts.rows[level, part + 1]
                         smooth_rates(first, last, net.which_row, net.nodal_means, net.momenta, net.sums, net.nodes)
@@ -231,10 +240,12 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
                             for j in range(first, last):
                                 if net.mirrored[net.which_row[j]]:
                                     net.nodes[net.which_row[j], V_GX] = 0.0
-                meet(meeting, threads)
+                    part = next_part(meeting, stage, thread, parts)
+                stage = next_stage(meeting, stage, parts)
                 mark = lap(tally.used, SMOOTH, thread, mark)
             if first_pass <= UPDATE <= last_pass:
-                for part in range(thread, parts, threads):
+                part = take_part(meeting, stage, thread, parts)
+                while part >= 0:
                     left, suspended, bad, limit, limit_speed = 0, 0, -1, np.inf, 0.0
                     for level in range(finished + 1):
                         more, wrong, loose, local, speed = update_points(
@@ -251,14 +262,18 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
                             limit, limit_speed = local, speed
                     tally.n_left[part], tally.suspended[part], tally.bad[part] = left, suspended, bad
                     tally.limits[part, 0], tally.limits[part, 1] = limit, limit_speed
-                meet(meeting, threads)
+                    part = next_part(meeting, stage, thread, parts)
+                stage = next_stage(meeting, stage, parts)
                 mark = lap(tally.used, UPDATE, thread, mark)
             if last_pass >= FOLLOW:
-                if thread == 0:
-                    tally.counts[SUBSTEPS] += 1
-                    tally.counts[POINT_STEPS] += ground.start[net.element_cuts[finished + 1]]
-                    follow(ground, net, cuts, medium, clock, finished, tally)
-                meet(meeting, threads)
+                part = take_part(meeting, stage, thread, parts)
+                while part >= 0:
+                    if part == 0:
+                        tally.counts[SUBSTEPS] += 1
+                        tally.counts[POINT_STEPS] += ground.start[net.element_cuts[finished + 1]]
+                        follow(ground, net, cuts, medium, clock, finished, tally)
+                    part = next_part(meeting, stage, thread, parts)
+                stage = next_stage(meeting, stage, parts)
                 mark = lap(tally.used, FOLLOW, thread, mark)
                 if tally.counts[BAD] >= 0:
                     return

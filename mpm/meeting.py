@@ -1,7 +1,8 @@
-"""Where the threads of a compiled step wait for each other: a few atomic instructions, no lock and no interpreter.
+"""How the threads of a compiled kernel share its stages: a few atomic instructions, no lock and no interpreter.
 
-A thread that waits spins for some microseconds, about as long as the passes of a step differ, and then gives its
-processor to whoever wants it, again and again: on a machine with other work the other thread is one of those.
+A kernel is a row of stages, each of as many parts as the mesh has. A thread does what parts of a stage it can get, its
+own first, and goes on when all are done, by whomever: where the machine has other work and a thread is not running,
+the others do its parts. They wait only for a part that has been begun, some ten microseconds at once and then asleep.
 """
 
 from llvmlite import ir
@@ -9,19 +10,23 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from mpm.jit import kernel
+from mpm.jit import kernel_part
 
-SPINS = 2000  # some microseconds
-#: Places in the array of a meeting, each in a cache line of its own: who has come, how many meetings there were, and
-#: whether one will never come.
-COME, HELD, ABANDONED, MEETING_WIDTH = 0, 16, 32, 48
+SPINS = 20_000  # some ten microseconds, as long as the shorter parts take
+PAUSE = 50  # microseconds
+LINE = 16  # numbers from one counter to the next, so that each is in a cache line of its own
 
-give_way = types.ExternalFunction("sched_yield", types.int32())  # POSIX
+fall_asleep = types.ExternalFunction("usleep", types.int32(types.uint32))  # POSIX
+
+
+def meeting_width(parts):
+    """Length of the int64 array, zeros at first, in which threads agree: stages begun of each part, then parts done."""
+    return LINE * (parts + 1)
 
 
 @intrinsic
 def add_atomic(typing_context, array, place, value):
-    """Add to an element of an int64 array, seen by all threads at once; returns what it was."""
+    """Add to an element of an int64 array; who sees it sees all that was written before."""
 
     def lower(context, builder, signature, arguments):
         pointer = _pointer(context, builder, signature.args[0], *arguments[:2])
@@ -41,26 +46,46 @@ def load_atomic(typing_context, array, place):
     return types.int64(array, types.int64), lower
 
 
+@intrinsic
+def exchange_atomic(typing_context, array, place, old, new):
+    """Set an element of an int64 array to `new` if it is `old`; whether it was."""
+
+    def lower(context, builder, signature, arguments):
+        pointer = _pointer(context, builder, signature.args[0], *arguments[:2])
+        return builder.extract_value(builder.cmpxchg(pointer, *arguments[2:], "seq_cst", "seq_cst"), 1)
+
+    return types.boolean(array, types.int64, types.int64, types.int64), lower
+
+
 def _pointer(context, builder, array_type, array, place):
     view = context.make_array(array_type)(context, builder, array)
     pointer = cgutils.gep_inbounds(builder, view.data, place)
     return builder.bitcast(pointer, ir.IntType(64).as_pointer())
 
 
-@kernel
-def meet(meeting, threads):
-    """Wait until all `threads` are here. meeting : (48,) int64, zeros at first."""
-    if threads == 1:
-        return
-    held = load_atomic(meeting, HELD)
-    if add_atomic(meeting, COME, 1) == threads - 1:
-        add_atomic(meeting, COME, -threads)
-        add_atomic(meeting, HELD, 1)
-        return
+@kernel_part
+def take_part(meeting, stage, thread, parts):
+    """A part of the stage that nobody has begun, or -1."""
+    for k in range(parts):
+        part = (thread + k) % parts
+        if exchange_atomic(meeting, LINE * part, stage, stage + 1):
+            return part
+    return -1
+
+
+@kernel_part
+def next_part(meeting, stage, thread, parts):
+    """Say that a part is done, and take another one as `take_part`."""
+    add_atomic(meeting, LINE * parts, 1)
+    return take_part(meeting, stage, thread, parts)
+
+
+@kernel_part
+def next_stage(meeting, stage, parts):
+    """Wait until all parts of the stage are done; returns the number of the stage that follows."""
     spins = 0
-    while load_atomic(meeting, HELD) == held:
+    while load_atomic(meeting, LINE * parts) < (stage + 1) * parts:
         spins += 1
         if spins > SPINS:
-            if load_atomic(meeting, ABANDONED) != 0:
-                return
-            give_way()
+            fall_asleep(PAUSE)
+    return stage + 1

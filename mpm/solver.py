@@ -2,7 +2,7 @@
 
 import math
 import os
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from types import SimpleNamespace
 
 import numpy as np
@@ -32,7 +32,7 @@ from mpm.long_step import (
     Walls,
     long_step_kernel,
 )
-from mpm.meeting import ABANDONED, MEETING_WIDTH
+from mpm.meeting import meeting_width
 from mpm.points import cut_by_points, fill, initial_stress, relocate_kernel, sort_by_element
 from mpm.spectrum import spectral_time_step
 from mpm.time_step import critical_time_step, dry_wave_speed, fast_wave_speed
@@ -122,7 +122,7 @@ class Solver:
         cuts = np.zeros((self.levels.count, PARTS + 1), np.int64)
         self._cuts = Cuts(cuts, _cut_evenly(self.levels.node_cuts), _cut_evenly(self.levels.row_cuts))
         self._meeting, self._counts, self._measures = (
-            np.zeros(MEETING_WIDTH, np.int64),
+            np.zeros(meeting_width(PARTS), np.int64),
             np.zeros(6, np.int64),
             np.zeros(2),
         )
@@ -372,22 +372,31 @@ class Solver:
         def call(r):
             return kernel(cuts[r], cuts[r + 1], *arguments, *(a[r] for a in per_range))
 
-        return self._by_threads(call, PARTS)
+        if self._pool is None:
+            return [call(r) for r in range(PARTS)]
+        others = [self._pool.submit(call, r) for r in range(1, PARTS)]
+        return [call(0), *(o.result() for o in others)]
 
     def together(self, kernel, *arguments):
-        """Run a kernel once by every thread: kernel(thread, threads, meeting, *arguments), see `mpm.meeting`."""
-        try:
-            self._by_threads(lambda thread: kernel(thread, self.threads, self._meeting, *arguments), self.threads)
-        except BaseException:  # an interrupt, before this thread has begun: the other must not wait
-            self._meeting[ABANDONED] = 1
-            raise
+        """Run a kernel of many stages by all threads: kernel(thread, meeting, first stage, *arguments).
 
-    def _by_threads(self, call, count):
-        """Results of `call` for the numbers from 0 to below `count`, some at the same time."""
-        if self._pool is None:
-            return [call(r) for r in range(count)]
-        others = [self._pool.submit(call, r) for r in range(1, count)]
-        return [call(0), *(o.result() for o in others)]
+        One that is late finds all done by the others (`mpm.meeting`), so nobody waits for its end.
+
+        Returns
+        -------
+        list of concurrent.futures.Future
+            The other threads.
+        """
+        stage = int(self._meeting[0])
+        others = []
+        try:
+            for thread in range(1, self.threads):
+                others.append(self._pool.submit(kernel, thread, self._meeting, stage, *arguments))
+            kernel(0, self._meeting, stage, *arguments)
+        except BaseException:  # an interrupt: the others would go on behind the caller's back
+            wait(others)
+            raise
+        return [other for other in others if not other.cancel()]
 
     # -- information ----------------------------------------------------------------------------
 
@@ -528,11 +537,12 @@ class Solver:
                 *self._moved, *self._spare, self._used,
             ),
         )  # fmt: skip
-        self.together(self._long_step, *arguments)
+        others = self.together(self._long_step, *arguments)
         self.n_occupied, self.n_active, self.suspended = (int(counts[k]) for k in (OCCUPIED, ACTIVE, SUSPENDED))
         self.largest_courant = float(self._measures[LARGEST_COURANT])
         self.removed_mass = float(self._measures[REMOVED_MASS])
         if counts[BAD] >= 0:
+            wait(others)
             raise RunFailed(
                 "a material point became non-finite (velocity, stress or pore pressure)",
                 self.time,

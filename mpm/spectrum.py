@@ -25,7 +25,7 @@ import numpy as np
 
 from mpm.contact import FIXED_X, FIXED_Y, free_pair
 from mpm.jit import kernel, kernel_part
-from mpm.meeting import meet
+from mpm.meeting import next_part, next_stage, take_part
 from mpm.variables import MASS, S_DRAG, S_G, S_LAMBDA, S_RHO_S, S_SIN_DIL, N, X, Y
 
 SAFETY = 0.9  # Ritz values come from below, and points move until the next estimate
@@ -245,7 +245,7 @@ def krylov_kernel(wet):
                 returned[c, x] += held[k, m + 2] * u + held[k, m + 4] * v + held[k, m + 5] * w
 
     @kernel
-    def build_krylov(thread, threads, meeting, operator, basis, hessenberg):
+    def build_krylov(thread, meeting, stage, operator, basis, hessenberg):
         """Arnoldi's process: orthonormal vectors that span the powers of the operator on the first of them.
 
         The operator takes nodal velocities to accelerations, with changed sign: stresses that build in a second, mass,
@@ -254,7 +254,7 @@ def krylov_kernel(wet):
         basis : (k + 1, n_nodes, 4 or 2) float64
             The first, a unit vector, is given.
         hessenberg : (k + 1, k) float64
-            Written by the first thread; zeros at first.
+            Written; zeros at first.
         """
         o = operator
         parts = o.force.shape[0]
@@ -262,13 +262,16 @@ def krylov_kernel(wet):
         for j in range(hessenberg.shape[1]):
             velocity, image = basis[j], basis[j + 1]
             if o.smoothing:
-                for part in range(thread, parts, threads):
+                part = take_part(meeting, stage, thread, parts)
+                while part >= 0:
                     sum_divergences(
                         o.element_cuts[part], o.element_cuts[part + 1], o.occupied, o.elements, o.rows, o.geometry,
                         o.held, velocity, o.divergence_of_part[part],
                     )  # fmt: skip
-                meet(meeting, threads)
-                for part in range(thread, parts, threads):
+                    part = next_part(meeting, stage, thread, parts)
+                stage = next_stage(meeting, stage, parts)
+                part = take_part(meeting, stage, thread, parts)
+                while part >= 0:
                     for r in range(o.row_cuts[part], o.row_cuts[part + 1]):
                         for phase in range(2):
                             total = 0.0
@@ -276,25 +279,33 @@ def krylov_kernel(wet):
                                 total += o.divergence_of_part[p, r, phase]
                                 o.divergence_of_part[p, r, phase] = 0.0
                             o.divergence[r, phase] = total * o.per_volume[r]
-                meet(meeting, threads)
-            for part in range(thread, parts, threads):
+                    part = next_part(meeting, stage, thread, parts)
+                stage = next_stage(meeting, stage, parts)
+            part = take_part(meeting, stage, thread, parts)
+            while part >= 0:
                 sum_forces(
                     o.element_cuts[part], o.element_cuts[part + 1], o.occupied, o.elements, o.rows, o.geometry, o.held,
                     velocity, o.smoothing, o.divergence, o.force[part],
                 )  # fmt: skip
-            meet(meeting, threads)
-            for part in range(thread, parts, threads):
+                part = next_part(meeting, stage, thread, parts)
+            stage = next_stage(meeting, stage, parts)
+            part = take_part(meeting, stage, thread, parts)
+            while part >= 0:
                 accelerate_nodes(
                     o.node_cuts[part], o.node_cuts[part + 1], o.force, o.nodal, o.drag_time, o.free, o.acceleration
                 )
-            meet(meeting, threads)
-            for part in range(thread, parts, threads):
+                part = next_part(meeting, stage, thread, parts)
+            stage = next_stage(meeting, stage, parts)
+            part = take_part(meeting, stage, thread, parts)
+            while part >= 0:
                 through_points(
                     o.element_cuts[part], o.element_cuts[part + 1], o.occupied, o.elements, o.held, o.acceleration,
                     o.returned[part],
                 )  # fmt: skip
-            meet(meeting, threads)
-            for part in range(thread, parts, threads):
+                part = next_part(meeting, stage, thread, parts)
+            stage = next_stage(meeting, stage, parts)
+            part = take_part(meeting, stage, thread, parts)
+            while part >= 0:
                 first, last = o.node_cuts[part], o.node_cuts[part + 1]
                 for i in range(first, last):
                     for x in range(width):
@@ -305,26 +316,30 @@ def krylov_kernel(wet):
                         image[i, x] = -total / o.nodal[i, x // 2] if o.free[i, x % 2] else 0.0
                 for k in range(j + 1):
                     o.dots[part, k] = product(flat[k], flat[j + 1], width * first, width * last)
-            meet(meeting, threads)
-            for part in range(thread, parts, threads):
+                part = next_part(meeting, stage, thread, parts)
+            stage = next_stage(meeting, stage, parts)
+            part = take_part(meeting, stage, thread, parts)
+            while part >= 0:
                 first, last = width * o.node_cuts[part], width * o.node_cuts[part + 1]
                 for k in range(j + 1):
                     share = o.dots[:, k].sum()
                     for i in range(first, last):
                         flat[j + 1, i] -= share * flat[k, i]
                 o.dots[part, -1] = product(flat[j + 1], flat[j + 1], first, last)
-            meet(meeting, threads)
+                part = next_part(meeting, stage, thread, parts)
+            stage = next_stage(meeting, stage, parts)
             norm = np.sqrt(o.dots[:, -1].sum())
-            if thread == 0:
-                for k in range(j + 1):
-                    hessenberg[k, j] = o.dots[:, k].sum()
-                hessenberg[j + 1, j] = norm
-            if norm == 0.0:
-                return
-            for part in range(thread, parts, threads):
+            scale = 1.0 / norm if norm > 0.0 else 0.0
+            part = take_part(meeting, stage, thread, parts)
+            while part >= 0:
                 for i in range(width * o.node_cuts[part], width * o.node_cuts[part + 1]):
-                    flat[j + 1, i] /= norm
-            meet(meeting, threads)
+                    flat[j + 1, i] *= scale
+                if part == 0:
+                    for k in range(j + 1):
+                        hessenberg[k, j] = o.dots[:, k].sum()
+                    hessenberg[j + 1, j] = norm
+                part = next_part(meeting, stage, thread, parts)
+            stage = next_stage(meeting, stage, parts)
 
     return build_krylov
 
