@@ -2,7 +2,7 @@
 
 A kernel is a row of stages, each of as many parts as the mesh has. A thread does what parts of a stage it can get, its
 own first, and goes on when all are done, by whomever: where the machine has other work and a thread is not running,
-the others do its parts. They wait only for a part that has been begun, some ten microseconds at once and then asleep.
+the others do its parts. They wait only for a part that has been begun, some eighty microseconds at once and then asleep.
 """
 
 from llvmlite import ir
@@ -12,7 +12,7 @@ from numba.extending import intrinsic
 
 from mpm.jit import kernel_part
 
-SPINS = 20_000  # some ten microseconds, as long as the shorter parts take
+SPINS = 300_000  # some eighty microseconds, about as long as one thread repairs the list of points
 PAUSE = 50  # microseconds
 LINE = 16  # numbers from one counter to the next, so that each is in a cache line of its own
 
