@@ -2,7 +2,7 @@
 
 A kernel is a row of stages, each of as many parts as the mesh has. A thread does what parts of a stage it can get, its
 own first, and goes on when all are done, by whomever: where the machine has other work and a thread is not running,
-the others do its parts. They wait only for a part that has been begun, some eighty microseconds at once and then asleep.
+the others do its parts. They wait only for a part that is begun, some eighty microseconds at once and then asleep.
 """
 
 from llvmlite import ir
