@@ -49,6 +49,7 @@ class Net(NamedTuple):
     element_cuts: np.ndarray  # of the levels
     ahead: np.ndarray
     volume: np.ndarray
+    fill: np.ndarray
     rates: np.ndarray
     which_node: np.ndarray
     next_row: np.ndarray
@@ -84,13 +85,14 @@ class Cuts(NamedTuple):
 
 
 class Clock(NamedTuple):
-    """Time steps of the levels [s], their share of FLIP, and the levels that begin and end a step in each substep.
+    """Time steps of the levels [s], their shares of FLIP and of the filter of the pore pressure.
 
-    `smallest` is the step of level 0.
+    `begun`, `finished`: the coarsest levels that begin and end a step in each substep; `smallest`: step of level 0.
     """
 
     dt_of_level: np.ndarray
     flip_of_level: np.ndarray
+    filter_of_level: np.ndarray
     begun: np.ndarray
     finished: np.ndarray
     smallest: float
@@ -102,7 +104,6 @@ class Medium(NamedTuple):
     gravity: float
     density_liquid: float
     bulk_liquid: float
-    pressure_filter: float
     wave_speed: float
 
 
@@ -201,7 +202,7 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
                             cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, ground.start,
                             ground.order, ground.points, ground.soil_of_point, ground.soils, medium.density_liquid,
                             net.rows, net.geometry, net.nodes, net.tied_means, net.level_of_element,
-                            clock.dt_of_level, clock.flip_of_level, medium.pressure_filter, net.momenta[part],
+                            clock.dt_of_level, clock.flip_of_level, clock.filter_of_level, net.momenta[part],
                         )  # fmt: skip
                     part = next_part(meeting, stage, thread, parts)
                 stage = next_stage(meeting, stage, parts)
@@ -225,7 +226,7 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
                     for level in range(finished + 1):
                         element_rates(
                             cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, net.rows,
-                            net.geometry, net.nodes, net.volume, net.rates, net.nodal_means[part],
+                            net.geometry, net.nodes, net.volume, net.fill, net.rates, net.nodal_means[part],
                         )  # fmt: skip
                     part = next_part(meeting, stage, thread, parts)
                 stage = next_stage(meeting, stage, parts)
@@ -235,7 +236,9 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
                 while part >= 0:
                     for level in range(finished + 1):
                         first, last = cuts.rows[level, part], cuts.rows[level, part + 1]
-                        smooth_rates(first, last, net.which_row, net.nodal_means, net.momenta, net.sums, net.nodes)
+                        smooth_rates(
+                            first, last, net.which_row, net.nodal_means, net.momenta, net.sums, net.nodes, net.fill
+                        )
                         if net.mirrored.size > 0:
                             for j in range(first, last):
                                 if net.mirrored[net.which_row[j]]:
@@ -252,7 +255,7 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
                             cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, ground.start,
                             ground.order, ground.points, ground.soil_of_point, ground.soils, medium.density_liquid,
                             medium.bulk_liquid, net.rows, net.geometry, net.nodes, net.rates, net.volume,
-                            net.level_of_element, clock.dt_of_level, net.ahead, advance, medium.wave_speed,
+                            net.fill, net.level_of_element, clock.dt_of_level, net.ahead, advance, medium.wave_speed,
                             ground.element_of_point, tally.clamps[part], net.sums[part], tally.left[part, left:],
                         )  # fmt: skip
                         left += more

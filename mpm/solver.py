@@ -139,6 +139,7 @@ class Solver:
         self.status = np.zeros(n, np.int8)
         self.rates = np.zeros((m, RATE_WIDTH))
         self.volume = np.zeros((m, 2))
+        self.fill = np.zeros(n_rows)
         self.ahead, self._periods = np.zeros(m), np.ones(self.levels.count, np.int64)  # equal steps: nothing runs ahead
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
         self.threads = 1 if m < SMALLEST_PARALLEL else max(1, min(threads or cores, PARTS))
@@ -447,7 +448,7 @@ class Solver:
         self.volume[:, 0] = np.bincount(element, volume, len(self.volume))
         self.volume[:, 1] = np.bincount(element, volume * (self.points[inside, P] > 0), len(self.volume))
         top, still = np.array([self.levels.count - 1]), np.zeros(self.levels.count)
-        self._run(Clock(still, still, top, top, 0.0), RATES, FOLLOW, advance=False)
+        self._run(Clock(still, still, still, top, top, 0.0), RATES, FOLLOW, advance=False)
         self._mapped = True
 
     def relax(self, progress=None):
@@ -466,14 +467,17 @@ class Solver:
         return steps, residual
 
     def open_gate(self):
-        """Take the plug away: the opening is free, its corners belong to the channel walls."""
+        """Take the plug away: the opening is free, its corners stand still or belong to the channel walls."""
         self.normal = self._normal_open
         self.active = self._active_open
+        if self.scene.gate.corners == "held":
+            self.fixed[self.mesh.corner_nodes] |= FIXED_X | FIXED_Y
         self.gate_open = True
 
     def close_gate(self):
         """Put the plug back: what is in the channel stays there, and nothing follows through the face."""
         self.normal, self.active = self._closed
+        self.fixed[self.mesh.corner_nodes] &= ~(FIXED_X | FIXED_Y)
         self.gate_open = False
 
     def step(self, dt_max=math.inf):
@@ -493,7 +497,9 @@ class Solver:
             self._periods, self.ahead[:] = periods, self.levels.ahead(periods)
         begun, finished = _last_multiples(periods, np.arange(count)), _last_multiples(periods, np.arange(1, count + 1))
         flip_of_level = np.exp(-self.scene.numerics.pic_rate * dt_of_level)
-        self._advance(Clock(dt_of_level, flip_of_level, begun, finished, smallest / self._finest_step))
+        # as often as those of the finest level
+        filter_of_level = 1.0 - (1.0 - self.scene.numerics.pressure_filter) ** periods
+        self._advance(Clock(dt_of_level, flip_of_level, filter_of_level, begun, finished, smallest / self._finest_step))
         self.time += smallest * count
         self.long_step_count += 1
         if self.long_step_count % STEPS_BETWEEN_SORTS == 0:
@@ -521,7 +527,7 @@ class Solver:
             ),
             Net(
                 levels.rows, self.geometry, self.neighbours, levels.of_element, levels.element_cuts, self.ahead,
-                self.volume, self.rates, levels.nodes, levels.next_row, levels.of_row, levels.row_order,
+                self.volume, self.fill, self.rates, levels.nodes, levels.next_row, levels.of_row, levels.row_order,
                 self._mirrored, self.nodes, self.tied_means, self.status, self.sums, self.momenta, self.nodal_means,
             ),
             Walls(
@@ -529,7 +535,7 @@ class Solver:
             ),
             self._cuts, clock,
             Medium(
-                self.scene.gravity, self._water_density, self._water_modulus, self.scene.numerics.pressure_filter,
+                self.scene.gravity, self._water_density, self._water_modulus,
                 self.limit_speed,
             ),
             Tally(
