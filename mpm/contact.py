@@ -110,8 +110,8 @@ def solve_nodes(
         What the parts of the mesh add to the rows; added in the order of the parts. Written: momenta of rows tied to
         a finer one, which follow the node.
     mean : (n_rows - n_nodes, 6) float64
-        Of rows tied to a finer one: mean over their step so far of the velocity of the grains, and of the remapped
-        velocities of both phases.
+        Of rows tied to a finer one: mean over their step so far of the velocity of the grains, and of the
+        velocities of both phases that strain (remapped or not).
     fixed, status : (n_nodes,) int8
         Bits of box boundary and mirror line; written: which constraints acted.
     contact_of_node : (n_nodes,) int32
@@ -372,8 +372,8 @@ def solve_dry_nodes(
 
 
 @cache
-def remap_kernel(wet):
-    """Kernel `remap_nodes` for points with pore water or without."""
+def remap_kernel(wet, remapping):
+    """Kernel `remap_nodes` for points with pore water or without; without `remapping` velocities stay as solved."""
 
     @kernel
     def remap_nodes(
@@ -390,61 +390,64 @@ def remap_kernel(wet):
             i = which[k]
             if nodes[i, V_MS] <= 0.0:
                 continue
-            sx = sy = lx = ly = 0.0
-            r = i
-            while r >= 0:
-                done = level_of_row[r] <= finished
-                for part in range(momenta.shape[0]):
-                    if done:
-                        sx += momenta[part, r, 0]
-                        sy += momenta[part, r, 1]
-                        if wet:
-                            lx += momenta[part, r, 2]
-                            ly += momenta[part, r, 3]
-                    else:
-                        sx += sums[part, r, B_PSX]
-                        sy += sums[part, r, B_PSY]
-                        if wet:
-                            lx += sums[part, r, B_PLX]
-                            ly += sums[part, r, B_PLY]
-                r = next_row[r]
-            sx /= nodes[i, V_MS]
-            sy /= nodes[i, V_MS]
-            if wet:
-                lx /= nodes[i, V_ML]
-                ly /= nodes[i, V_ML]
-            c = contact_of_node[i]
-            if c >= 0 and active[c]:
-                nx, ny = normal[c, 0], normal[c, 1]
-                if wall is not None:
-                    sx -= wall[c, 0]
-                    sy -= wall[c, 1]
-                    lx -= wall[c, 0]
-                    ly -= wall[c, 1]
-                if status[i] & SOLID_STICKS:
-                    sx = sy = 0.0
-                else:
-                    vn = nx * sx + ny * sy
-                    if status[i] & SOLID_HELD or vn < 0.0:
-                        sx -= vn * nx
-                        sy -= vn * ny
+            if remapping:
+                sx = sy = lx = ly = 0.0
+                r = i
+                while r >= 0:
+                    done = level_of_row[r] <= finished
+                    for part in range(momenta.shape[0]):
+                        if done:
+                            sx += momenta[part, r, 0]
+                            sy += momenta[part, r, 1]
+                            if wet:
+                                lx += momenta[part, r, 2]
+                                ly += momenta[part, r, 3]
+                        else:
+                            sx += sums[part, r, B_PSX]
+                            sy += sums[part, r, B_PSY]
+                            if wet:
+                                lx += sums[part, r, B_PLX]
+                                ly += sums[part, r, B_PLY]
+                    r = next_row[r]
+                sx /= nodes[i, V_MS]
+                sy /= nodes[i, V_MS]
                 if wet:
-                    vn = nx * lx + ny * ly
-                    if status[i] & LIQUID_HELD or vn < 0.0:
-                        lx -= vn * nx
-                        ly -= vn * ny
-                if wall is not None:
-                    sx += wall[c, 0]
-                    sy += wall[c, 1]
-                    lx += wall[c, 0]
-                    ly += wall[c, 1]
-            if fixed[i] & FIXED_X:
-                sx = lx = 0.0
-            if fixed[i] & FIXED_Y:
-                sy = ly = 0.0
-            nodes[i, V_SX], nodes[i, V_SY] = sx, sy
-            if wet:
-                nodes[i, V_LX], nodes[i, V_LY] = lx, ly
+                    lx /= nodes[i, V_ML]
+                    ly /= nodes[i, V_ML]
+                c = contact_of_node[i]
+                if c >= 0 and active[c]:
+                    nx, ny = normal[c, 0], normal[c, 1]
+                    if wall is not None:
+                        sx -= wall[c, 0]
+                        sy -= wall[c, 1]
+                        lx -= wall[c, 0]
+                        ly -= wall[c, 1]
+                    if status[i] & SOLID_STICKS:
+                        sx = sy = 0.0
+                    else:
+                        vn = nx * sx + ny * sy
+                        if status[i] & SOLID_HELD or vn < 0.0:
+                            sx -= vn * nx
+                            sy -= vn * ny
+                    if wet:
+                        vn = nx * lx + ny * ly
+                        if status[i] & LIQUID_HELD or vn < 0.0:
+                            lx -= vn * nx
+                            ly -= vn * ny
+                    if wall is not None:
+                        sx += wall[c, 0]
+                        sy += wall[c, 1]
+                        lx += wall[c, 0]
+                        ly += wall[c, 1]
+                if fixed[i] & FIXED_X:
+                    sx = lx = 0.0
+                if fixed[i] & FIXED_Y:
+                    sy = ly = 0.0
+                nodes[i, V_SX], nodes[i, V_SY] = sx, sy
+                if wet:
+                    nodes[i, V_LX], nodes[i, V_LY] = lx, ly
+            else:
+                sx, sy, lx, ly = nodes[i, V_SX], nodes[i, V_SY], nodes[i, V_LX], nodes[i, V_LY]
             r = next_row[i]
             while r >= 0:
                 t = r - n_nodes

@@ -53,6 +53,7 @@ FEWEST_BETWEEN_SPECTRA, MOST_BETWEEN_SPECTRA, MOST_BETWEEN_SPECTRA_OF_LEVELS = 5
 ALMOST = 1.1  # a step shortened by less to meet an output time counts as limited by what limited it before
 # Of the spectral step over that of the altitude. Beyond, a few points resist nothing where they are: no estimate.
 MOST_OVER_ALTITUDE = 4.0
+LEAST_OVER_ALTITUDE = 1e-3  # without remapping a node that a point hardly touches takes less: the run would stand still
 SMALLEST_PARALLEL = 4000  # elements; below it a second thread costs more than it brings
 SMALLEST_CUT = 4000  # points, nodes or rows of some levels; fewer are not cut into parts, whatever the threads
 
@@ -164,8 +165,8 @@ class Solver:
         plastic = any(soil.model == "mohr-coulomb" for soil in scene.soils)
         self._solve_nodes = solve_nodes if wet else solve_dry_nodes
         tied = self.levels.count > 1
-        self._advance_points = advance_kernel(wet, tied)
-        self._remap_nodes = remap_kernel(wet)
+        self._advance_points = advance_kernel(wet, tied, scene.numerics.remapping)
+        self._remap_nodes = remap_kernel(wet, scene.numerics.remapping)
         self._rates = rates_kernel(wet)
         dilatant = plastic and any(soil.dilatancy_angle > 0 for soil in scene.soils if soil.model != "elastic")
         self._update = update_kernel(wet, plastic, scene.numerics.volumetric_smoothing, dilatant, tied)
@@ -322,6 +323,14 @@ class Solver:
             step, self.mode = spectral_time_step(self, certain, self.mode)
             if step > MOST_OVER_ALTITUDE * shortest / self.wave_speed:
                 step = 0.5 * shortest / self.wave_speed
+            if step < LEAST_OVER_ALTITUDE * shortest / self.wave_speed and not self.scene.numerics.remapping:
+                components = 2 if self.scene.water is None else 4
+                raise RunFailed(
+                    f"the time step fell to {step:.2g} s, which nodes that points hardly touch need without remapping; "
+                    "set remapping = true in [numerics]",
+                    self.time,
+                    self.mesh.nodes[int(np.argmax(np.abs(self.mode))) // components],
+                )
             most = MOST_BETWEEN_SPECTRA if self.levels.count == 1 else MOST_BETWEEN_SPECTRA_OF_LEVELS
             fallen = step < 0.9 * self.longest_step
             self.estimate_interval = FEWEST_BETWEEN_SPECTRA if fallen else min(2 * self.estimate_interval, most)

@@ -9,12 +9,18 @@ The stiffness holds what the kernels hold: mean volume changes, element strains,
 nodes, twice, with the points between (velocities return to the nodes through them, MUSL), which takes the shortest
 waves of consistent-mass kind away. Altitude over wave speed knows none of this.
 
+Without remapping (USL) strains follow the solved velocities u + dt a, only the points take the way S from the nodes to
+the points and back: u' = u + dt S a, x' = x + dt (u + dt a). At z = -1 these are dt^2 (2 - S) k = 4 m: the way is not
+taken off the acceleration, but from twice of it, and what damps waves, (1 - S) dt^2 k / m a step, lowers the limit.
+With drag this is on the safe side: the implicit drag then counts (2 - S) times.
+
 With local time stepping the step of level 0 is sought for which the same holds when the stiffness of every element is
 multiplied by the square of its own step over that of level 0, and the drag of a node by the step of its finest level.
 Where the stress that acts runs ahead by a share a of a step, dt^2 k (1 + 2 a) = 4 m: a damping of a dt k, explicit.
 
 With a share s of PIC velocities are multiplied by g = 1 - s + s f in a step, where 0 <= f <= 1 is what the way
 through the points leaves of the mode; then dt^2 k = 2 (1 + g) m, and dt sqrt(1 - s/2) is not above any of these.
+Without remapping it is dt^2 k = 2 (1 + g) m / (1 + g - S), which PIC raises.
 """
 
 import math
@@ -208,6 +214,7 @@ class Spectrum:
         n_nodes = len(mesh.nodes)
         self.wet = solver.scene.water is not None
         self.smoothing = solver.scene.numerics.volumetric_smoothing
+        self.remapping = solver.scene.numerics.remapping
         self.step_of_node = 2.0 ** levels.of_row[:n_nodes]
         occupied = solver.occupied[: solver.n_occupied]
         self.layout = occupied, mesh.elements, levels.rows, solver.geometry
@@ -235,7 +242,7 @@ class Spectrum:
         before, result = np.zeros_like(velocity), np.zeros_like(velocity)
         accelerate_nodes(force, self.nodal, 0.5 * dt * self.step_of_node, self.free, before)
         through_points(occupied, elements, self.held, self.nodal, self.free, before, result)
-        return result
+        return result if self.remapping else 2 * before - result
 
     def largest(self, dt, start=None):
         """Largest eigenvalue [1/s2] with drag over dt [s], and its mode; start: a guess of the mode."""
@@ -285,6 +292,8 @@ def spectral_time_step(solver, shortest, start=None):
         if not 0 < value < math.inf:
             return shortest, None
         dt = 2.0 / math.sqrt(value)
+    if not spectrum.remapping:
+        return SAFETY * dt, start
     longest = dt * 2.0 ** (solver.levels.count - 1)
     pic_share = -math.expm1(-solver.scene.numerics.pic_rate * longest)
     return SAFETY * math.sqrt(1 - 0.5 * pic_share) * dt, start

@@ -98,15 +98,18 @@ def on_element(n0, n1, n2):
 
 
 @cache
-def advance_kernel(wet, tied):
-    """Kernel `advance_points` for points with pore water or without, on levels tied to each other or on one."""
+def advance_kernel(wet, tied, remapping):
+    """Kernel `advance_points` for points with pore water or without, on levels tied to each other or on one.
+
+    Without `remapping` no momenta are mapped back.
+    """
 
     @kernel
     def advance_points(
         first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, rows, geometry, nodes,
         mean, level_of_element, dt_of_level, flip_of_level, pressure_filter, sums,
     ):  # fmt: skip
-        """Advance point velocities and positions from the nodes and map the new momenta back (MUSL).
+        """Advance point velocities and positions from the nodes and, with remapping, map new momenta back (MUSL).
 
         Velocities take `flip_of_level` of the FLIP and the rest of the PIC update; positions move with
         the solid. A positive pore pressure is drawn by `pressure_filter` towards its projection on
@@ -115,7 +118,7 @@ def advance_kernel(wet, tied):
         mean : (n_rows - n_nodes, 6) float64
             Of rows tied to a finer one: mean velocities over the steps of their node, of :mod:`mpm.contact`.
         sums : (n_rows, 4) float64
-            Added: the new momenta of both phases [kg m/s per metre].
+            Added with remapping: the new momenta of both phases [kg m/s per metre].
 
         Source: Sulsky, Zhou & Schreyer (1995) for MUSL; Zhu & Bridson (2005) for the PIC/FLIP blend.
         """
@@ -164,50 +167,53 @@ def advance_kernel(wet, tied):
                     ux = flip_fraction * ux + pic * hx
                     uy = flip_fraction * uy + pic * hy
                     smooth = max(n0 * nodes[a, V_P] + n1 * nodes[b, V_P] + n2 * nodes[c, V_P], 0.0)
-                    # the terms of each node in the order of its sums, so that they become vectors
-                    sx0 += n0 * (m * vx)
-                    sy0 += n0 * (m * vy)
-                    lx0 += n0 * (w * ux)
-                    ly0 += n0 * (w * uy)
-                    sx1 += n1 * (m * vx)
-                    sy1 += n1 * (m * vy)
-                    lx1 += n1 * (w * ux)
-                    ly1 += n1 * (w * uy)
-                    sx2 += n2 * (m * vx)
-                    sy2 += n2 * (m * vy)
-                    lx2 += n2 * (w * ux)
-                    ly2 += n2 * (w * uy)
+                    if remapping:
+                        # the terms of each node in the order of its sums, so that they become vectors
+                        sx0 += n0 * (m * vx)
+                        sy0 += n0 * (m * vy)
+                        lx0 += n0 * (w * ux)
+                        ly0 += n0 * (w * uy)
+                        sx1 += n1 * (m * vx)
+                        sy1 += n1 * (m * vy)
+                        lx1 += n1 * (w * ux)
+                        ly1 += n1 * (w * uy)
+                        sx2 += n2 * (m * vx)
+                        sy2 += n2 * (m * vy)
+                        lx2 += n2 * (w * ux)
+                        ly2 += n2 * (w * uy)
                     points[i, VSX], points[i, VSY], points[i, VLX], points[i, VLY] = vx, vy, ux, uy
                     if points[i, P] > 0.0:
                         points[i, P] += pressure_filter * (smooth - points[i, P])
                 else:
-                    sx0 += n0 * (m * vx)
-                    sy0 += n0 * (m * vy)
-                    sx1 += n1 * (m * vx)
-                    sy1 += n1 * (m * vy)
-                    sx2 += n2 * (m * vx)
-                    sy2 += n2 * (m * vy)
+                    if remapping:
+                        sx0 += n0 * (m * vx)
+                        sy0 += n0 * (m * vy)
+                        sx1 += n1 * (m * vx)
+                        sy1 += n1 * (m * vy)
+                        sx2 += n2 * (m * vx)
+                        sy2 += n2 * (m * vy)
                     points[i, VSX], points[i, VSY] = vx, vy
                 if border:
                     gx += n0 * jx0 + n1 * jx1 + n2 * jx2
                     gy += n0 * jy0 + n1 * jy1 + n2 * jy2
                 points[i, X] += dt * gx
                 points[i, Y] += dt * gy
-            sums[a, 0] += sx0
-            sums[a, 1] += sy0
-            if wet:
-                sums[a, 2] += lx0
-                sums[a, 3] += ly0
-            sums[b, 0] += sx1
-            sums[b, 1] += sy1
-            if wet:
-                sums[b, 2] += lx1
-                sums[b, 3] += ly1
-            sums[c, 0] += sx2
-            sums[c, 1] += sy2
-            if wet:
-                sums[c, 2] += lx2
-                sums[c, 3] += ly2
+            if remapping:
+                sums[a, 0] += sx0
+                sums[a, 1] += sy0
+                if wet:
+                    sums[a, 2] += lx0
+                    sums[a, 3] += ly0
+                sums[b, 0] += sx1
+                sums[b, 1] += sy1
+                if wet:
+                    sums[b, 2] += lx1
+                    sums[b, 3] += ly1
+                sums[c, 0] += sx2
+                sums[c, 1] += sy2
+                if wet:
+                    sums[c, 2] += lx2
+                    sums[c, 3] += ly2
 
     return advance_points
 

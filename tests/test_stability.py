@@ -22,6 +22,8 @@ COLUMNS = {
     "stiff and loose": {"youngs_modulus": 1e10, "porosity": 0.89, "hydraulic_conductivity": 1e-8},
     "one point": {"points": 1},
     "edges": {"positions": "edges"},
+    "no remapping": {"remapping": False},
+    "no remapping, vertices": {"remapping": False, "positions": "vertices", "bulk_modulus": None},
     "vertices, flat, not smoothed": {"positions": "vertices", "aspect": 3.0, "volumetric_smoothing": False},
     "skew": {"skew": 0.2},
     "1 mm": {"size": 1e-3},

@@ -66,6 +66,7 @@ def _boxes():
     yield case("pic=0", "pure FLIP", pic_rate=0.0)
     yield case("pic=1e6", "pure PIC", pic_rate=1e6)
     yield case("no smoothing", "no volumetric smoothing", volumetric_smoothing=False)
+    yield case("no remapping", "strains from the solved velocities (USL)", remapping=False)
     yield case("E=1e+10,K_w=1e+06", "stiff skeleton, soft water", youngs_modulus=1e10, bulk_modulus=1e6)
     yield case("E=1e+05,K_w=1e+11", "soft skeleton, stiff water", youngs_modulus=1e5, bulk_modulus=1e11)
     yield case("size=1mm", "elements of 1 mm", size=1e-3, seconds=0.02)
@@ -97,6 +98,7 @@ def _tunnels():
     for angle in (0.0, 45.0, 180.0):
         yield case(f"gate at {angle:g}", "angle of the gate [degree]", angle=angle)
     yield case("sink", "material taken out behind the gate", interior="sink")
+    yield case("no remapping,gate", "strains from the solved velocities (USL)", remapping=False, seconds=0.1)
     yield case("full", "tunnel filled to the crown, gate open: rest", filled_tunnel, True)
     yield case(
         "filling", "a small tunnel until nothing more fits", gate, diameter=1.0, width=0.2, cover=3.0, seconds=3.0

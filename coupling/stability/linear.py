@@ -43,6 +43,8 @@ def columns():
             "positions",
             Column(positions=place, points=points, seed=seed, bulk_modulus=modulus, volumetric_smoothing=smoothing),
         )
+    for (place, points, seed), modulus in itertools.product(POSITIONS, (None, 8e7)):
+        yield "no remapping", Column(positions=place, points=points, seed=seed, bulk_modulus=modulus, remapping=False)
     shapes = [(aspect, skew, seed) for aspect in (0.3, 1.0, 3.0) for skew, seed in ((0.0, 0), (0.2, 0), (0.2, 1))]
     for (aspect, skew, seed), place, smoothing in itertools.product(shapes, ("layout", "vertices"), (True, False)):
         yield "mesh", Column(aspect=aspect, skew=skew, seed=seed, positions=place, volumetric_smoothing=smoothing)
@@ -107,7 +109,8 @@ def critical_map(chosen=None, progress=None):
         for name in names
         if name not in ("family", "positions")
     }
-    data["volumetric_smoothing"] = (data["volumetric_smoothing"][0], data["volumetric_smoothing"][1].astype(np.int8))
+    for name in ("volumetric_smoothing", "remapping"):
+        data[name] = (data[name][0], data[name][1].astype(np.int8))
     for name in ("family", "positions"):
         data[name] = ("configuration", np.array([row[name] for row in rows], dtype=object))
     text = (

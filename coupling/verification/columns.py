@@ -46,7 +46,7 @@ def column(cells, height, conductivity, bulk_modulus, youngs_modulus=4e7, model=
 
 def terzaghi(
     cells=20, conductivity=1e-4, bulk_modulus=8e7, time_factor=0.1, model="elastic", points=3, courant=0.8,
-    pic_rate=10.0, smoothing=True, pressure_filter=0.4, inertia=False,
+    pic_rate=10.0, smoothing=True, remapping=True, pressure_filter=0.4, inertia=False,
 ):  # fmt: skip
     """Let an excess pressure, carried by the water of a column of 1 m, drain through its top until Tv = `time_factor`.
 
@@ -57,7 +57,7 @@ def terzaghi(
     height, initial = 1.0, 1e4
     scene, mesh = column(
         cells, height, conductivity, bulk_modulus, model=model, points=points, courant=courant, pic_rate=pic_rate,
-        volumetric_smoothing=smoothing, pressure_filter=pressure_filter,
+        volumetric_smoothing=smoothing, remapping=remapping, pressure_filter=pressure_filter,
     )  # fmt: skip
     solver = Solver(scene, mesh, threads=1)
     hydrostatic = solver.points[:, P].copy()
@@ -87,7 +87,7 @@ def terzaghi(
     )  # fmt: skip
 
 
-def oedometer(cells=5, strain=1e-3, duration=0.5, points=3, courant=0.8, pic_rate=10.0, smoothing=True):
+def oedometer(cells=5, strain=1e-3, duration=0.5, points=3, courant=0.8, pic_rate=10.0, smoothing=True, remapping=True):
     """Press the top of a dry elastic column of 1 m down by `strain`, slowly: stresses of its points.
 
     Reference: Hooke's law without lateral strain, sigma_yy = M e, sigma_xx = nu/(1-nu) sigma_yy, with the logarithmic
@@ -96,7 +96,7 @@ def oedometer(cells=5, strain=1e-3, duration=0.5, points=3, courant=0.8, pic_rat
     size = 1.0 / cells
     scene = dry_scene(
         "oedometer", size, 2 * size, 1.0, {"model": "elastic", "poissons_ratio": NU}, gravity=1e-9, points=points,
-        courant=courant, pic_rate=pic_rate, volumetric_smoothing=smoothing,
+        courant=courant, pic_rate=pic_rate, volumetric_smoothing=smoothing, remapping=remapping,
     )  # fmt: skip
     solver = DrivenSolver(scene, box_mesh([-size, 0.0, size], np.linspace(-1, 0, cells + 1)), damping=0.5)
     solver.points[:, [SXX, SYY, SZZ]] = 0.0
@@ -118,7 +118,7 @@ def oedometer(cells=5, strain=1e-3, duration=0.5, points=3, courant=0.8, pic_rat
 
 
 def hydrostatics(
-    size=0.35, size_growth=0.3, duration=0.05, points=3, courant=0.8, pic_rate=10.0, smoothing=True,
+    size=0.35, size_growth=0.3, duration=0.05, points=3, courant=0.8, pic_rate=10.0, smoothing=True, remapping=True,
     pressure_filter=0.4, local_time_stepping=True,
 ):  # fmt: skip
     """Ground under K0 and hydrostatic stress around a lining without a gate, left to itself for `duration` [s].
@@ -137,7 +137,7 @@ def hydrostatics(
             "element_size": 3.0, "element_size_lining": size, "size_growth": size_growth, "points_per_element": points,
         },
         numerics={
-            "courant": courant, "pic_rate": pic_rate, "volumetric_smoothing": smoothing,
+            "courant": courant, "pic_rate": pic_rate, "volumetric_smoothing": smoothing, "remapping": remapping,
             "pressure_filter": pressure_filter, "local_time_stepping": local_time_stepping,
         },
     ).mpm  # fmt: skip
@@ -176,6 +176,7 @@ def hydrostatics(
 
 NUMERICS = {
     "points": (1, 3, 12), "courant": (0.2, 0.4, 0.8, 1.0), "pic_rate": (0.0, 10.0, 100.0), "smoothing": (False, True),
+    "remapping": (False, True),
 }  # fmt: skip
 
 register(Problem(
