@@ -79,11 +79,23 @@ class Box(Part):
 
 
 class Water(Part):
-    """Pore water; everything below the table is saturated, and so is what hangs above it. A dry scene has none."""
+    """Pore water; everything below the table is saturated, and so is what hangs above it. A dry scene has none.
+
+    Parameters
+    ----------
+    table_depth : float
+        Of the ground water below the surface [m].
+    density, bulk_modulus : float
+        [kg/m3], [Pa]
+    drainage : str
+        "two-phase": water has a velocity of its own, by drag and the conductivity of the soils. "undrained": it moves
+        with the grains, the limit of a conductivity of zero; conductivities are not read.
+    """
 
     table_depth: Length = Field(ge=0)
     density: Density = Field(gt=500, lt=2000)
     bulk_modulus: Pressure = Field(ge=1e6, le=1e11)
+    drainage: Literal["two-phase", "undrained"] = "two-phase"
 
 
 class Soil(Part):
@@ -347,13 +359,20 @@ class Scene(Part):
                 f"soils: top_depth {tops[-1]:g} m must lie in the box of depth {self.box.depth:g} m; leave "
                 "the layer out, or deepen the box"
             )
-        if self.water is not None:
+        if self.is_two_phase:
             unknown = [soil.name for soil in self.soils if soil.hydraulic_conductivity is None]
             if unknown:
                 raise ValueError(
                     f"soil '{unknown[0]}': hydraulic_conductivity must be given where there is water, got none; give "
                     "the Darcy conductivity in m/s, sand about 1e-4, or leave [water] out for a dry scene"
                 )
+        moving = [k for k, tunnel in enumerate(self.tunnels) if self.lining_of(tunnel) != "fixed"]
+        if self.is_undrained and moving:
+            raise ValueError(
+                f"water: drainage = 'undrained' needs linings that are held, got lining = "
+                f"'{self.lining_of(self.tunnels[moving[0]])}' of tunnel {moving[0]}, whose motion is solved with the "
+                "momentum of the water; leave drainage out and give a small hydraulic_conductivity"
+            )
         if self.water is not None and self.water.table_depth >= self.box.depth:
             raise ValueError(
                 f"water: table_depth {self.water.table_depth:g} m must lie in the box of depth {self.box.depth:g} m; "
@@ -426,6 +445,16 @@ class Scene(Part):
         if self.lining_of(self.tunnels[0]) != "fixed":
             return "a lining that moves"
         return None
+
+    @property
+    def is_two_phase(self):
+        """Whether there is water with a velocity of its own."""
+        return self.water is not None and self.water.drainage == "two-phase"
+
+    @property
+    def is_undrained(self):
+        """Whether there is water that moves with the grains."""
+        return self.water is not None and self.water.drainage == "undrained"
 
     @property
     def is_half(self):

@@ -45,12 +45,14 @@ E_GRAINS, E_WATER, ELEMENT_WIDTH = 6, 12, 18
 @kernel
 def sum_points(
     occupied, start, order, points, soil_of_point, soils, density_liquid, bulk_liquid, elements, rows, geometry,
-    stiffened, held, nodal, row_volume,
+    stiffened, undrained, held, nodal, row_volume,
 ):  # fmt: skip
     """Sum the points in their elements and at the nodes.
 
     stiffened : (n_elements,) float64
         Factor of the stiffness of an element.
+    undrained : bool
+        The pore water moves with the grains: its mass counts as theirs.
     held : (n_occupied, 18) float64
         Written: see the columns `E_`.
     nodal : (n_nodes, 4) float64
@@ -71,6 +73,8 @@ def sum_points(
             volume = mass / (soils[s, S_RHO_S] * (1.0 - n))
             water = volume * density_liquid
             stiff = volume * stiffened[e]
+            if undrained:
+                mass += n * water
             held[k, E_V] += volume
             if soils[s, S_SIN_DIL] > 0.0:
                 held[k, E_OWN] += volume
@@ -133,17 +137,17 @@ def sum_forces(occupied, elements, rows, geometry, held, velocity, smoothing, di
         xx, yy = g1x * ux1 + g2x * ux2, g1y * uy1 + g2y * uy2
         xy = 0.5 * (g1y * ux1 + g2y * ux2 + g1x * uy1 + g2x * uy2)
         own = volume = xx + yy
-        liquid = 0.0
+        liquid = own
         if wet:
             liquid = g1x * (velocity[b, 2] - velocity[a, 2]) + g2x * (velocity[c, 2] - velocity[a, 2])
             liquid += g1y * (velocity[b, 3] - velocity[a, 3]) + g2y * (velocity[c, 3] - velocity[a, 3])
         if smoothing:
             r, s, t = rows[e, 0], rows[e, 1], rows[e, 2]
             volume = third * (divergence[r, 0] + divergence[s, 0] + divergence[t, 0])
-            liquid = third * (divergence[r, 1] + divergence[s, 1] + divergence[t, 1])
+            liquid = third * (divergence[r, 1] + divergence[s, 1] + divergence[t, 1]) if wet else volume
         skeleton = volume + held[k, E_OWN] * (own - volume)
         correction = 0.5 * (skeleton - own)
-        pressure = -(held[k, E_QS] * volume + held[k, E_QL] * liquid) if wet else 0.0
+        pressure = -(held[k, E_QS] * volume + held[k, E_QL] * liquid)
         sxx = held[k, E_LAMBDA] * skeleton + 2.0 * held[k, E_G] * (xx + correction) - pressure
         syy = held[k, E_LAMBDA] * skeleton + 2.0 * held[k, E_G] * (yy + correction) - pressure
         sxy = 2.0 * held[k, E_G] * xy
@@ -212,7 +216,7 @@ class Spectrum:
     def __init__(self, solver):
         mesh, levels = solver.mesh, solver.levels
         n_nodes = len(mesh.nodes)
-        self.wet = solver.scene.water is not None
+        self.wet = solver.scene.is_two_phase
         self.smoothing = solver.scene.numerics.volumetric_smoothing
         self.remapping = solver.scene.numerics.remapping
         self.step_of_node = 2.0 ** levels.of_row[:n_nodes]
@@ -225,7 +229,7 @@ class Spectrum:
         sum_points(
             occupied, solver.start, solver.order, solver.points, solver.soil_of_point, solver.soils,
             solver._water_density, solver._water_modulus, mesh.elements, levels.rows, solver.geometry,
-            4.0**levels.of_element * (1 + 2 * ahead), self.held, self.nodal, row_volume,
+            4.0**levels.of_element * (1 + 2 * ahead), solver.scene.is_undrained, self.held, self.nodal, row_volume,
         )  # fmt: skip
         self.per_volume = np.divide(1.0, row_volume, out=np.zeros_like(row_volume), where=row_volume > 0)[:, None]
         fixed = solver.fixed[:, None] & np.array([FIXED_X, FIXED_Y], np.int8)

@@ -98,11 +98,12 @@ def on_element(n0, n1, n2):
 
 
 @cache
-def advance_kernel(wet, tied, remapping):
+def advance_kernel(wet, undrained, tied, remapping):
     """Kernel `advance_points` for points with pore water or without, on levels tied to each other or on one.
 
-    Without `remapping` no momenta are mapped back.
+    `undrained`: the water has the velocity of the grains. Without `remapping` no momenta are mapped back.
     """
+    two_phase = wet and not undrained
 
     @kernel
     def advance_points(
@@ -118,7 +119,7 @@ def advance_kernel(wet, tied, remapping):
         mean : (n_rows - n_nodes, 6) float64
             Of rows tied to a finer one: mean velocities over the steps of their node, of :mod:`mpm.contact`.
         sums : (n_rows, 4) float64
-            Added with remapping: the new momenta of both phases [kg m/s per metre].
+            Added with remapping: the new momenta of both phases, or of the mixture [kg m/s per metre].
 
         Source: Sulsky, Zhou & Schreyer (1995) for MUSL; Zhu & Bridson (2005) for the PIC/FLIP blend.
         """
@@ -160,13 +161,18 @@ def advance_kernel(wet, tied, remapping):
                 vy = flip_fraction * vy + pic * gy
                 if wet:
                     w = m / (soils[index(soil_of_point[i]), S_RHO_S] * (1.0 - points[i, N])) * density_liquid
+                    smooth = max(n0 * nodes[a, V_P] + n1 * nodes[b, V_P] + n2 * nodes[c, V_P], 0.0)
+                    if points[i, P] > 0.0:
+                        points[i, P] += pressure_filter * (smooth - points[i, P])
+                if undrained:
+                    m += points[i, N] * w
+                if two_phase:
                     hx = n0 * nodes[a, V_LX] + n1 * nodes[b, V_LX] + n2 * nodes[c, V_LX]
                     hy = n0 * nodes[a, V_LY] + n1 * nodes[b, V_LY] + n2 * nodes[c, V_LY]
                     ux = points[i, VLX] + n0 * nodes[a, V_DLX] + n1 * nodes[b, V_DLX] + n2 * nodes[c, V_DLX]
                     uy = points[i, VLY] + n0 * nodes[a, V_DLY] + n1 * nodes[b, V_DLY] + n2 * nodes[c, V_DLY]
                     ux = flip_fraction * ux + pic * hx
                     uy = flip_fraction * uy + pic * hy
-                    smooth = max(n0 * nodes[a, V_P] + n1 * nodes[b, V_P] + n2 * nodes[c, V_P], 0.0)
                     if remapping:
                         # the terms of each node in the order of its sums, so that they become vectors
                         sx0 += n0 * (m * vx)
@@ -182,8 +188,6 @@ def advance_kernel(wet, tied, remapping):
                         lx2 += n2 * (w * ux)
                         ly2 += n2 * (w * uy)
                     points[i, VSX], points[i, VSY], points[i, VLX], points[i, VLY] = vx, vy, ux, uy
-                    if points[i, P] > 0.0:
-                        points[i, P] += pressure_filter * (smooth - points[i, P])
                 else:
                     if remapping:
                         sx0 += n0 * (m * vx)
@@ -193,6 +197,8 @@ def advance_kernel(wet, tied, remapping):
                         sx2 += n2 * (m * vx)
                         sy2 += n2 * (m * vy)
                     points[i, VSX], points[i, VSY] = vx, vy
+                    if undrained:
+                        points[i, VLX], points[i, VLY] = vx, vy
                 if border:
                     gx += n0 * jx0 + n1 * jx1 + n2 * jx2
                     gy += n0 * jy0 + n1 * jy1 + n2 * jy2
@@ -201,17 +207,17 @@ def advance_kernel(wet, tied, remapping):
             if remapping:
                 sums[a, 0] += sx0
                 sums[a, 1] += sy0
-                if wet:
+                if two_phase:
                     sums[a, 2] += lx0
                     sums[a, 3] += ly0
                 sums[b, 0] += sx1
                 sums[b, 1] += sy1
-                if wet:
+                if two_phase:
                     sums[b, 2] += lx1
                     sums[b, 3] += ly1
                 sums[c, 0] += sx2
                 sums[c, 1] += sy2
-                if wet:
+                if two_phase:
                     sums[c, 2] += lx2
                     sums[c, 3] += ly2
 
@@ -219,8 +225,8 @@ def advance_kernel(wet, tied, remapping):
 
 
 @cache
-def rates_kernel(wet):
-    """Kernel `element_rates` for points with pore water or without."""
+def rates_kernel(wet, undrained):
+    """Kernel `element_rates` for points with pore water or without, `undrained` where it moves with the grains."""
 
     @kernel
     def element_rates(first, last, occupied, rows, geometry, nodes, volume, rates, sums):
@@ -248,17 +254,19 @@ def rates_kernel(wet):
                 sums[d, 0] += v
                 sums[d, 1] += v * rates[e, R_DS]
             if wet:
-                rates[e, R_DL] = (
-                    g1x * (nodes[b, V_LX] - nodes[a, V_LX]) + g2x * (nodes[c, V_LX] - nodes[a, V_LX])
-                    + g1y * (nodes[b, V_LY] - nodes[a, V_LY]) + g2y * (nodes[c, V_LY] - nodes[a, V_LY])
-                )  # fmt: skip
+                if not undrained:
+                    rates[e, R_DL] = (
+                        g1x * (nodes[b, V_LX] - nodes[a, V_LX]) + g2x * (nodes[c, V_LX] - nodes[a, V_LX])
+                        + g1y * (nodes[b, V_LY] - nodes[a, V_LY]) + g2y * (nodes[c, V_LY] - nodes[a, V_LY])
+                    )  # fmt: skip
                 pressed = volume[e, 1]
                 p1, p2 = nodes[b, V_P] - nodes[a, V_P], nodes[c, V_P] - nodes[a, V_P]
                 px, py = pressed * (g1x * p1 + g2x * p2), pressed * (g1y * p1 + g2y * p2)
                 for d in (a, b, c):
                     sums[d, 2] += pressed
                     sums[d, 3] += pressed * rates[e, R_DS]
-                    sums[d, 4] += pressed * rates[e, R_DL]
+                    if not undrained:
+                        sums[d, 4] += pressed * rates[e, R_DL]
                     sums[d, 5] += px
                     sums[d, 6] += py
 
@@ -266,12 +274,15 @@ def rates_kernel(wet):
 
 
 @cache
-def update_kernel(wet, plastic, smoothing, dilatant, tied):
+def update_kernel(wet, undrained, plastic, smoothing, dilatant, tied):
     """Kernel `update_points` for what the scene has: pore water, plastic or dilatant soils, smoothed volume changes.
+
+    `undrained` pore water has the velocity of the grains: div v_s = div v_l, one momentum, no drag.
 
     A dilatant soil's skeleton takes the rates of its own element. Plastic volume from shear differs between elements,
     and so does the stress that follows; smoothed rates give no resistance to the motions that this drives, which grow.
     """
+    two_phase = wet and not undrained
 
     @kernel
     def update_points(
@@ -339,10 +350,11 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
                 # gradient of the projected pressure, less its nodal mean: zero for a linear pressure
                 px = g1x * (p1 - p0) + g2x * (p2 - p0) - third * (nodes[i0, V_GX] + nodes[i1, V_GX] + nodes[i2, V_GX])
                 py = g1y * (p1 - p0) + g2y * (p2 - p0) - third * (nodes[i0, V_GY] + nodes[i1, V_GY] + nodes[i2, V_GY])
-                own_l = dt * rates[e, R_DL]
+                own_l = dt * rates[e, R_DL] if two_phase else own_s
                 wet_s, wet_l = own_s, own_l
                 if smoothing and volume[e, 1] > 0.0:
-                    wet_s = dt * third * (nodes[i0, V_WS] + nodes[i1, V_WS] + nodes[i2, V_WS])
+                    wet_s = wet_l = dt * third * (nodes[i0, V_WS] + nodes[i1, V_WS] + nodes[i2, V_WS])
+                if smoothing and two_phase and volume[e, 1] > 0.0:
                     wet_l = dt * third * (nodes[i0, V_WL] + nodes[i1, V_WL] + nodes[i2, V_WL])
             correction = 0.5 * (ts - rates[e, R_DS])
             exx = dt * (rates[e, R_XX] + correction)
@@ -442,6 +454,27 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
                     fp += v * p
                     w = v * density_liquid
                     pore = n * w
+                if undrained:
+                    ms0 += n0 * m
+                    ml0 += n0 * w
+                    mn0 += n0 * pore
+                    q0 += n0 * excess
+                    ms1 += n1 * m
+                    ml1 += n1 * w
+                    mn1 += n1 * pore
+                    q1 += n1 * excess
+                    ms2 += n2 * m
+                    ml2 += n2 * w
+                    mn2 += n2 * pore
+                    q2 += n2 * excess
+                    m += pore
+                    sx0 += n0 * (m * vx)
+                    sy0 += n0 * (m * vy)
+                    sx1 += n1 * (m * vx)
+                    sy1 += n1 * (m * vy)
+                    sx2 += n2 * (m * vx)
+                    sy2 += n2 * (m * vy)
+                elif wet:
                     drag = pore * soils[s, S_DRAG]
                     ux, uy = points[i, VLX], points[i, VLY]
                     fastest = max(fastest, ux * ux + uy * uy)
@@ -509,11 +542,12 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
                 sums[i0, B_MS] += ms0
                 sums[i0, B_ML] += ml0
                 sums[i0, B_MN] += mn0
-                sums[i0, B_D] += d0
+                if two_phase:
+                    sums[i0, B_D] += d0
+                    sums[i0, B_PLX] += lx0
+                    sums[i0, B_PLY] += ly0
                 sums[i0, B_PSX] += sx0
                 sums[i0, B_PSY] += sy0
-                sums[i0, B_PLX] += lx0
-                sums[i0, B_PLY] += ly0
                 sums[i0, B_Q] += q0 - damped * (g0x * px + g0y * py)
                 sums[i0, B_FX] -= g0x * fxx + g0y * fxy
                 sums[i0, B_FY] -= g0x * fxy + g0y * fyy
@@ -522,11 +556,12 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
                 sums[i1, B_MS] += ms1
                 sums[i1, B_ML] += ml1
                 sums[i1, B_MN] += mn1
-                sums[i1, B_D] += d1
+                if two_phase:
+                    sums[i1, B_D] += d1
+                    sums[i1, B_PLX] += lx1
+                    sums[i1, B_PLY] += ly1
                 sums[i1, B_PSX] += sx1
                 sums[i1, B_PSY] += sy1
-                sums[i1, B_PLX] += lx1
-                sums[i1, B_PLY] += ly1
                 sums[i1, B_Q] += q1 - damped * (g1x * px + g1y * py)
                 sums[i1, B_FX] -= g1x * fxx + g1y * fxy
                 sums[i1, B_FY] -= g1x * fxy + g1y * fyy
@@ -535,11 +570,12 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
                 sums[i2, B_MS] += ms2
                 sums[i2, B_ML] += ml2
                 sums[i2, B_MN] += mn2
-                sums[i2, B_D] += d2
+                if two_phase:
+                    sums[i2, B_D] += d2
+                    sums[i2, B_PLX] += lx2
+                    sums[i2, B_PLY] += ly2
                 sums[i2, B_PSX] += sx2
                 sums[i2, B_PSY] += sy2
-                sums[i2, B_PLX] += lx2
-                sums[i2, B_PLY] += ly2
                 sums[i2, B_Q] += q2 - damped * (g2x * px + g2y * py)
                 sums[i2, B_FX] -= g2x * fxx + g2y * fxy
                 sums[i2, B_FY] -= g2x * fxy + g2y * fyy
@@ -572,7 +608,7 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
 
 
 @cache
-def map_kernel(wet, tied):
+def map_kernel(wet, undrained, tied):
     """Kernel `map_point` for points with pore water or without; with levels a point may wait outside its element."""
 
     @kernel
@@ -606,18 +642,20 @@ def map_kernel(wet, tied):
                 weight, gx, gy = n2, geometry[2], geometry[3]
             b = sums[corner[k]]
             b[B_MS] += weight * m
-            b[B_PSX] += weight * m * row[VSX]
-            b[B_PSY] += weight * m * row[VSY]
+            moving = weight * (m + n * v * density_liquid) if undrained else weight * m
+            b[B_PSX] += moving * row[VSX]
+            b[B_PSY] += moving * row[VSY]
             b[B_FX] -= gx * fxx + gy * fxy
             b[B_FY] -= gx * fxy + gy * fyy
             if wet:
                 w = weight * v * density_liquid
                 b[B_ML] += w
                 b[B_MN] += n * w
-                b[B_D] += n * soil[S_DRAG] * w
                 b[B_Q] += weight * v * excess
-                b[B_PLX] += w * row[VLX]
-                b[B_PLY] += w * row[VLY]
+                if not undrained:
+                    b[B_D] += n * soil[S_DRAG] * w
+                    b[B_PLX] += w * row[VLX]
+                    b[B_PLY] += w * row[VLY]
                 b[B_FLX] += gx * v * p
                 b[B_FLY] += gy * v * p
         return v, fastest

@@ -18,6 +18,7 @@ COLUMNS = {
     "real water": {"bulk_modulus": 2.2e9},
     "dry": {"bulk_modulus": None},
     "clay": {"hydraulic_conductivity": 1e-12},
+    "undrained": {"drainage": "undrained"},
     "gravel": {"hydraulic_conductivity": 10.0},
     "stiff and loose": {"youngs_modulus": 1e10, "porosity": 0.89, "hydraulic_conductivity": 1e-8},
     "one point": {"points": 1},

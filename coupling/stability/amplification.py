@@ -54,6 +54,8 @@ class Column:
         Of random positions.
     skew : float
         Largest shift of the inner nodes over the cell [-].
+    drainage
+        As in `mpm.scene.Water`.
     pic_rate, pressure_filter, volumetric_smoothing, remapping
         As in `mpm.scene.Numerics`.
     """
@@ -74,13 +76,16 @@ class Column:
     volumetric_smoothing: bool = True
     remapping: bool = True
     poissons_ratio: float = 0.3
+    drainage: str = "two-phase"
 
     def scene(self):
         """The scene of the column."""
         width, height = 2 * self.size * self.aspect, self.cells * self.size
         size = {f"element_size{part}": self.size for part in ("", "_lining", "_interior")}
         wet = self.bulk_modulus is not None
-        water = {"table_depth": 0.0, "density": 1000.0, "bulk_modulus": self.bulk_modulus} if wet else None
+        water = {
+            "table_depth": 0.0, "density": 1000.0, "bulk_modulus": self.bulk_modulus, "drainage": self.drainage,
+        } if wet else None  # fmt: skip
         return Scene.model_validate({
             "name": "column",
             "box": {"width": width, "depth": height},

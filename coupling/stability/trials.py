@@ -22,11 +22,11 @@ SOIL = {
 NUMERICS = ("courant", "pic_rate", "pressure_filter", "volumetric_smoothing", "remapping")
 
 
-def box_scene(size, bulk_modulus=8e7, gravity=9.81, table_depth=0.0, points=3, **settings):
+def box_scene(size, bulk_modulus=8e7, gravity=9.81, table_depth=0.0, points=3, drainage="two-phase", **settings):
     """Scene of a box of 12 by 8 cells of the given size [m]; other settings go to the soil or to [numerics]."""
     numerics = {k: settings.pop(k) for k in NUMERICS if k in settings}
     sizes = {f"element_size{part}": size for part in ("", "_lining", "_interior")}
-    water = {"table_depth": table_depth, "density": 1000.0, "bulk_modulus": bulk_modulus}
+    water = {"table_depth": table_depth, "density": 1000.0, "bulk_modulus": bulk_modulus, "drainage": drainage}
     return Scene.model_validate({
         "name": "box",
         "gravity": gravity,
@@ -115,16 +115,17 @@ def one_point(size=0.1, seconds=2.0, **settings):
 
 def coarse_tunnel(
     diameter=6.6, cover=1.0, width=0.2, angle=90.0, water=True, gravity=9.81, bulk_modulus=8e7, interior="resolved",
-    remapping=True, **soil,
+    remapping=True, drainage="two-phase", **soil,
 ):  # fmt: skip
     """Scene of one tunnel with a gate on the coarsest mesh that makes sense; `cover` in diameters."""
     box_width, depth = 5 * diameter, (cover + 2.5) * diameter
+    pore_water = {"table_depth": 0.0, "density": 1000.0, "bulk_modulus": bulk_modulus, "drainage": drainage}
     return Scene.model_validate({
         "name": "tunnel",
         "gravity": gravity,
         "interior": interior,
         "box": {"width": box_width, "depth": depth},
-        "water": {"table_depth": 0.0, "density": 1000.0, "bulk_modulus": bulk_modulus} if water else None,
+        "water": pore_water if water else None,
         "soils": [SOIL | soil],
         "tunnels": [{
             "x": 0.0, "cover": cover * diameter, "outer_diameter": diameter, "inner_diameter": 0.9 * diameter,

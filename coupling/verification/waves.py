@@ -6,7 +6,7 @@ import numpy as np
 
 from coupling.stability.monitor import kinetic_energy, strain_energy
 from coupling.verification.boxes import box_mesh
-from coupling.verification.columns import column
+from coupling.verification.columns import DRAINAGE, column
 from coupling.verification.driven import dry_scene
 from coupling.verification.problem import Problem, Result, Stopwatch, register
 from coupling.verification.two_phase import YOUNG, exact_velocities, modes
@@ -18,7 +18,7 @@ HEIGHT = 10.0  # [m]
 
 def two_phase_wave(
     cells=20, conductivity=1.0, bulk_modulus=8e7, mode="fast", periods=2.0, points=3, courant=0.8, pic_rate=0.0,
-    smoothing=True, remapping=True, pressure_filter=0.4,
+    smoothing=True, remapping=True, pressure_filter=0.4, drainage="two-phase",
 ):  # fmt: skip
     """Quarter of a standing wave in a column of 10 m, fixed at the bottom, free at the top, under its own weight.
 
@@ -27,7 +27,7 @@ def two_phase_wave(
     """
     scene, mesh = column(
         cells, HEIGHT, conductivity, bulk_modulus, YOUNG, points=points, courant=courant, pic_rate=pic_rate,
-        volumetric_smoothing=smoothing, remapping=remapping, pressure_filter=pressure_filter,
+        volumetric_smoothing=smoothing, remapping=remapping, pressure_filter=pressure_filter, drainage=drainage,
     )  # fmt: skip
     solver = Solver(scene, mesh, threads=1)
     speeds, shapes = modes(bulk_modulus)
@@ -134,5 +134,5 @@ for name, title, fast, limit, why in (
 ):  # fmt: skip
     register(Problem(
         name=name, title=title, source=SOURCE, norm=NORM, solve=two_phase_wave, fast={"cells": 20, **fast},
-        ladder=WET, limit=limit, why=why,
+        ladder=WET | ({"drainage": DRAINAGE} if name == "undrained-wave" else {}), limit=limit, why=why,
     ))  # fmt: skip
