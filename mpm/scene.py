@@ -266,8 +266,8 @@ class Numerics(Part):
         Mean volumetric strain rates over the elements around a node.
     remapping : bool
         Strain rates of nodal velocities that are mapped anew from the advanced points (MUSL, Sulsky, Zhou & Schreyer
-        1995); false: of those just solved, as before it (USL). It costs a tenth of a step, but a node that a point
-        hardly touches then strains without bound, and the critical step falls with its mass.
+        1995); false: of those just solved, as before it (USL). That saves some percent of a step, but a node that a
+        point hardly touches strains without bound, and the critical step falls with its mass.
     critical_step : str
         Where the critical time step comes from: "altitude" of the elements over the wave speed, or "spectral", the
         largest eigenvalue of the points on their mesh, renewed now and then (`mpm.spectrum`).
