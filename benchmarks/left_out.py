@@ -151,8 +151,8 @@ def main():
         f"Frictionless linings compile nothing away: {contacts} of {nodes} nodes touch a lining, and what they cost is "
         'in the noise. Drag is implicit, so tight ground takes the time step of sand and `drainage = "undrained"` '
         "changes only the work of a step. Without smoothing the nodal means are still summed, since the pressure's "
-        "projection needs them. Without remapping the second map is saved, but nodes that points hardly touch shorten the "
-        "steps of the finest levels, which cost more a point. A dry scene keeps the water's columns: a point is two "
+        "projection needs them. Without remapping the second map is saved, but nodes that points hardly touch shorten "
+        "the steps of the finest levels, which cost more a point. A dry scene keeps the water's columns: a point is two "
         "cache lines, whatever it holds.",
         "",
         "Levels follow the mesh, so steps of two meshes do not compare one by one: with a sink the finest level holds "
