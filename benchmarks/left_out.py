@@ -152,8 +152,8 @@ def main():
         'in the noise. Drag is implicit, so tight ground takes the time step of sand and `drainage = "undrained"` '
         "changes only the work of a step. Without smoothing the nodal means are still summed, since the pressure's "
         "projection needs them. Without remapping the second map is saved, but nodes that points hardly touch shorten "
-        "the steps of the finest levels, which cost more a point. A dry scene keeps the water's columns: a point is two "
-        "cache lines, whatever it holds.",
+        "the steps of the finest levels, which cost more a point. A dry scene keeps the water's columns: a point is "
+        "two cache lines, whatever it holds.",
         "",
         "Levels follow the mesh, so steps of two meshes do not compare one by one: with a sink the finest level holds "
         f"fewer points and takes a shorter step ({1e6 * by_name['sink']['dt']:.0f} us, {by_name['sink']['levels']} "
