@@ -9,12 +9,18 @@ The stiffness holds what the kernels hold: mean volume changes, element strains,
 nodes, twice, with the points between (velocities return to the nodes through them, MUSL), which takes the shortest
 waves of consistent-mass kind away. Altitude over wave speed knows none of this.
 
+Without remapping (USL) strains follow the solved velocities u + dt a, only the points take the way S from the nodes to
+the points and back: u' = u + dt S a, x' = x + dt (u + dt a). At z = -1 these are dt^2 (2 - S) k = 4 m: the way is not
+taken off the acceleration, but from twice of it, and what damps waves, (1 - S) dt^2 k / m a step, lowers the limit.
+With drag this is on the safe side: the implicit drag then counts (2 - S) times.
+
 With local time stepping the step of level 0 is sought for which the same holds when the stiffness of every element is
 multiplied by the square of its own step over that of level 0, and the drag of a node by the step of its finest level.
 Where the stress that acts runs ahead by a share a of a step, dt^2 k (1 + 2 a) = 4 m: a damping of a dt k, explicit.
 
 With a share s of PIC velocities are multiplied by g = 1 - s + s f in a step, where 0 <= f <= 1 is what the way
 through the points leaves of the mode; then dt^2 k = 2 (1 + g) m, and dt sqrt(1 - s/2) is not above any of these.
+Without remapping it is dt^2 k = 2 (1 + g) m / (1 + g - S), which PIC raises.
 """
 
 import math
@@ -41,12 +47,14 @@ E_GRAINS, E_WATER, ELEMENT_WIDTH = 7, 13, 19
 @kernel
 def sum_points(
     occupied, start, order, points, soil_of_point, soils, density_liquid, bulk_liquid, elements, rows, geometry,
-    stiffened, held, nodal, row_volume,
+    stiffened, undrained, held, nodal, row_volume,
 ):  # fmt: skip
     """Sum the points in their elements and at the nodes.
 
     stiffened : (n_elements,) float64
         Factor of the stiffness of an element.
+    undrained : bool
+        The pore water moves with the grains: its mass counts as theirs.
     held : (n_occupied, 19) float64
         Written: see the columns `E_`.
     nodal : (n_nodes, 4) float64
@@ -67,6 +75,8 @@ def sum_points(
             volume = mass / (soils[s, S_RHO_S] * (1.0 - n))
             water = volume * density_liquid
             stiff = volume * stiffened[e]
+            if undrained:
+                mass += n * water
             held[k, E_V] += volume
             if soils[s, S_SIN_DIL] > 0.0:
                 held[k, E_OWN] += volume
@@ -148,17 +158,19 @@ def sum_forces(occupied, elements, rows, geometry, held, velocity, smoothing, di
         xx, yy = g1x * ux1 + g2x * ux2, g1y * uy1 + g2y * uy2
         xy = 0.5 * (g1y * ux1 + g2y * ux2 + g1x * uy1 + g2x * uy2)
         own = volume = xx + yy
-        liquid = 0.0
+        liquid = own
         if wet:
             liquid = g1x * (velocity[b, 2] - velocity[a, 2]) + g2x * (velocity[c, 2] - velocity[a, 2])
             liquid += g1y * (velocity[b, 3] - velocity[a, 3]) + g2y * (velocity[c, 3] - velocity[a, 3])
         if smoothing:
             r, s, t = rows[e, 0], rows[e, 1], rows[e, 2]
             volume = third * (divergence[r, 0] + divergence[s, 0] + divergence[t, 0])
-            liquid = volume + third * (divergence[r, 1] + divergence[s, 1] + divergence[t, 1])
+            liquid = volume
+            if wet:
+                liquid += third * (divergence[r, 1] + divergence[s, 1] + divergence[t, 1])
         skeleton = volume + held[k, E_OWN] * (own - volume)
         correction = 0.5 * (skeleton - own)
-        pressure = -(held[k, E_QS] * volume + held[k, E_QL] * liquid) if wet else 0.0
+        pressure = -(held[k, E_QS] * volume + held[k, E_QL] * liquid)
         sxx = held[k, E_LAMBDA] * skeleton + 2.0 * held[k, E_G] * (xx + correction) - pressure
         syy = held[k, E_LAMBDA] * skeleton + 2.0 * held[k, E_G] * (yy + correction) - pressure
         sxy = 2.0 * held[k, E_G] * xy
@@ -229,8 +241,9 @@ class Spectrum:
     def __init__(self, solver):
         mesh, levels = solver.mesh, solver.levels
         n_nodes = len(mesh.nodes)
-        self.wet = solver.scene.water is not None
+        self.wet = solver.scene.is_two_phase
         self.smoothing = solver.scene.numerics.volumetric_smoothing
+        self.remapping = solver.scene.numerics.remapping
         self.step_of_node = 2.0 ** levels.of_row[:n_nodes]
         occupied = solver.occupied[: solver.n_occupied]
         self.layout = occupied, mesh.elements, levels.rows, solver.geometry
@@ -241,7 +254,7 @@ class Spectrum:
         sum_points(
             occupied, solver.start, solver.order, solver.points, solver.soil_of_point, solver.soils,
             solver._water_density, solver._water_modulus, mesh.elements, levels.rows, solver.geometry,
-            4.0**levels.of_element * (1 + 2 * ahead), self.held, self.nodal, row_volume,
+            4.0**levels.of_element * (1 + 2 * ahead), solver.scene.is_undrained, self.held, self.nodal, row_volume,
         )  # fmt: skip
         row_spread = np.zeros_like(row_volume)
         row_area = np.bincount(
@@ -265,7 +278,7 @@ class Spectrum:
         before, result = np.zeros_like(velocity), np.zeros_like(velocity)
         accelerate_nodes(force, self.nodal, 0.5 * dt * self.step_of_node, self.free, before)
         through_points(occupied, elements, self.held, self.nodal, self.free, before, result)
-        return result
+        return result if self.remapping else 2 * before - result
 
     def largest(self, dt, start=None):
         """Largest eigenvalue [1/s2] with drag over dt [s], and its mode; start: a guess of the mode."""
@@ -315,6 +328,8 @@ def spectral_time_step(solver, shortest, start=None):
         if not 0 < value < math.inf:
             return shortest, None
         dt = 2.0 / math.sqrt(value)
+    if not spectrum.remapping:
+        return SAFETY * dt, start
     longest = dt * 2.0 ** (solver.levels.count - 1)
     pic_share = -math.expm1(-solver.scene.numerics.pic_rate * longest)
     return SAFETY * math.sqrt(1 - 0.5 * pic_share) * dt, start
