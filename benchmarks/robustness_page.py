@@ -93,14 +93,15 @@ def _kills(part):
     return [
         "## Kills",
         "",
-        f"`uv run python benchmarks/kills.py --kills {part['kills']} --seed {part['seed']}`. A small run of "
-        f"{part['life_seconds']:.1f} s is ended by SIGKILL at a moment drawn evenly over its life, and resumed; every "
-        "fourth resumed one is killed again. What the kills left behind:",
+        f"`uv run python benchmarks/kills.py --kills {part['kills']} --seed {part['seed']}`. A small run that takes "
+        f"{part['life_seconds']:.1f} s of processor time is ended by SIGKILL at a moment drawn evenly over that time, "
+        "and resumed; every fourth resumed one is killed again. What the kills left behind:",
         "",
         "| state | kills |",
         "|---|---|",
         *rows,
         "",
+        f'All of them struck before the run\'s file said "finished"; {part["late"]} more came later and do not count. '
         f"{part['kills']} kills in {part['runs']} runs; {part['identical']} of {part['runs']} runs ended with the bits "
         f"of the uninterrupted run, in {part['seconds']:.0f} s.",
         *_faults(part["different"]),
