@@ -80,8 +80,8 @@ def _files(part):
         "|---|" + "---|" * len(kinds),
         *rows,
         "",
-        f"Faults (a traceback, a crash, more than {part['patience']:g} s, other values than the whole file's without "
-        f"a word, a file changed by a command that refused it): {len(part['faults'])}. Together "
+        f"Faults (a traceback, a crash, more than {part['patience']:g} s of processor time, other values than the "
+        f"whole file's without a word, a file changed by a command that refused it): {len(part['faults'])}. Together "
         f"{part['seconds']:.0f} s.",
         *_faults(part["faults"]),
         *_where(part),
