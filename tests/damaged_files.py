@@ -88,7 +88,7 @@ def run_content(path):
     from coupling.datasets import read_run
     from coupling.info import describe
     from coupling.pressure_source import read_source
-    from coupling.report.page import collect
+    from coupling.report.run_page import collect
 
     content = {}
     for node in read_run(path).subtree:

@@ -106,7 +106,7 @@ def choose(browser, select, value):
 def show_frame(browser, frame):
     """Move the slider, as dragging does."""
     browser.evaluate(
-        f"(() => {{ const s = document.getElementById('time'); s.value = {frame};"
+        f"(() => {{ const s = document.getElementById('slider'); s.value = {frame};"
         " s.dispatchEvent(new Event('input', {bubbles: true})); })()"
     )
 
@@ -214,15 +214,15 @@ def test_unrolled_curves_lie_where_their_axes_say(opened, tree, frame):
 
 
 def test_keys_and_button_move_the_slider(opened):
-    value = "Number(document.getElementById('time').value)"
+    value = "Number(document.getElementById('slider').value)"
     assert opened.evaluate(value) == 4
-    opened.evaluate("document.getElementById('time').focus()")
+    opened.evaluate("document.getElementById('slider').focus()")
     positions = []
     for key in ("Home", "ArrowRight", "ArrowRight", "End", "ArrowLeft"):
         opened.press(key)
         positions.append(opened.evaluate(value))
     assert positions == [0, 1, 2, 4, 3]
-    spoken = opened.evaluate("document.getElementById('time').getAttribute('aria-valuetext')")
+    spoken = opened.evaluate("document.getElementById('slider').getAttribute('aria-valuetext')")
     assert spoken == "0.75 s, 225 kg/m" == opened.evaluate("document.getElementById('now').innerText")
     opened.press("End")
     opened.press(" ")

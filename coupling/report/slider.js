@@ -1,14 +1,25 @@
-// One slider for every chart: the frame that is shown, playing, keys.
-const slider = document.getElementById("time"), play = document.getElementById("play"), now = document.getElementById("now");
-const last = times.length - 1, SECONDS_OF_PLAY = 8;
-let views = [], timer = null;
+// One slider for every chart of a page: the frame that is shown, playing, keys.
+const slider = document.getElementById("slider"), play = document.getElementById("play"), now = document.getElementById("now");
+const SECONDS_OF_PLAY = 8;
+let last = 0, views = [], told = null, timer = null;
+
+// `count` frames, `text` of a frame; `drawn`: what has a method draw(frame)
+function startSlider(count, text, drawn) {
+  last = count - 1;
+  told = text;
+  views = drawn;
+  slider.max = last;
+  slider.addEventListener("input", () => { stop(); show(Number(slider.value)); });
+  play.addEventListener("click", toggle);
+  document.getElementById("player").addEventListener("keydown", onKey);
+  show(last);
+}
 
 function show(frame) {
   const k = Math.max(0, Math.min(last, Math.round(frame)));
   slider.value = k;
-  const text = `${shown(times[k])} s, ${shown(inflow[k])} kg/m`;
-  now.textContent = text;
-  slider.setAttribute("aria-valuetext", text);
+  now.textContent = told(k);
+  slider.setAttribute("aria-valuetext", told(k));
   for (const view of views) view.draw(k);
 }
 
@@ -31,11 +42,6 @@ function toggle() {
   }, Math.min(400, Math.max(40, 1000 * SECONDS_OF_PLAY / Math.max(last, 1))));
 }
 
-function pick(time) {
-  stop();
-  show(nearest(times, time));
-}
-
 function onKey(event) {
   if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest("select, button, summary, pre")) return;
   const step = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
@@ -47,34 +53,6 @@ function onKey(event) {
   else return;
   event.preventDefault();
 }
-
-slider.max = last;
-let rings = ringCharts();
-const fixed = [...timeCharts(pick)];
-if (models.length) {
-  fixed.push(new DeformedRing(), { draw: drawModelTable });
-  if (document.getElementById("joint-table")) fixed.push({ draw: drawJointTable });
-}
-if (data.fields) fixed.push(new FieldView());
-views = [...rings, ...fixed];
-slider.addEventListener("input", () => { stop(); show(Number(slider.value)); });
-play.addEventListener("click", toggle);
-document.getElementById("player").addEventListener("keydown", onKey);
-document.getElementById("shape").addEventListener("change", (event) => {
-  shape = event.target.value;
-  for (const ring of rings) { ring.build(); ring.draw(Number(slider.value)); }
-});
-const tunnelChoice = document.getElementById("tunnel");
-if (tunnelChoice) {
-  tunnelChoice.value = tunnel;
-  tunnelChoice.addEventListener("change", () => {
-    tunnel = Number(tunnelChoice.value);
-    for (const ring of rings) { ring.build(); ring.draw(Number(slider.value)); }
-  });
-}
-if (data.mesh) new MeshView();
-drawSection();
-show(last);
 
 // on paper nothing can be unfolded
 let opened = [];
