@@ -1,4 +1,4 @@
-"""What every page has: its frame with style, script and data, numbers as people read them, figures, tables, warnings."""
+"""What every page has: its frame with style, script and data, numbers as people read them, figures, warnings."""
 
 import json
 from html import escape

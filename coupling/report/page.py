@@ -1,5 +1,6 @@
 """A report as one file: of a run or of a study, told apart by what lies in the folder, put together and written."""
 
+import contextlib
 import os
 import tempfile
 from importlib import resources
@@ -56,6 +57,22 @@ def write_report(path, out=None):
     return target
 
 
+def write_run_reports(folder):
+    """Write the pages of all runs of a study beside them; a run without a record gets none. Returns their paths."""
+    from coupling.datasets import RunFileError
+    from coupling.studies.case import RUN_FOLDER
+    from coupling.studies.collect import stored_cases
+    from coupling.studies.execute import case_file
+
+    written = []
+    for case in stored_cases(folder)[1]:
+        run = case_file(Path(folder), case).parent / RUN_FOLDER
+        if (run / RUN_FILE).is_file():
+            with contextlib.suppress(RunFileError):
+                written.append(write_report(run))
+    return written
+
+
 def study_folder(path):
     """The folder of a study that a path names; None where it can only be a run.
 
@@ -103,4 +120,4 @@ def _file(name):
     return (resources.files("coupling.report") / name).read_text(encoding="utf-8")
 
 
-__all__ = ["is_report", "study_folder", "write_report"]
+__all__ = ["is_report", "study_folder", "write_report", "write_run_reports"]

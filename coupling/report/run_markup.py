@@ -2,7 +2,7 @@
 
 from html import escape
 
-from coupling.report.frame import duration, figure, header, provenance, rows_of_facts, scroll, shown
+from coupling.report.frame import duration, figure, header, provenance, rows_of_facts, shown
 
 VERDICTS = {True: "as expected", False: "look at this", None: "–"}
 MODEL_QUESTION = "Lining models side by side"

@@ -43,7 +43,7 @@ function toggle() {
 }
 
 function onKey(event) {
-  if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest("select, button, summary, pre")) return;
+  if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest("select, button, summary, pre, a, input:not(#slider)")) return;
   const step = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
   if (event.key === " ") toggle();
   else if (event.target === slider || event.target.closest(".scroll")) return;
