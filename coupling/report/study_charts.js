@@ -12,6 +12,10 @@ function gapMarks(shownCases) {
   });
 }
 
+// Numbers of the cases beside their lines, where they are few; many are told by the check boxes.
+const numbersOf = (shownCases) => (shownCases.length > COLOURS.length ? []
+  : legend(shownCases.map((one) => [String(one.number), "line", one.style])));
+
 class RingComparison {
   constructor(key) {
     this.key = key;
@@ -41,7 +45,7 @@ class RingComparison {
     });
     const what = `${this.key.replace(/_/g, " ")} in ${this.unit}${against === "change" ? ", change" : ""}`;
     document.getElementById(this.key).setAttribute("aria-label", `${what}: ${told.join("; ") || "no case is shown"}`);
-    caption(this.key, sentence(this.summary(frame)));
+    caption(this.key, ...numbersOf(this.cases), sentence(this.summary(frame)));
   }
   // exact also where the curves are thinned
   extremes(one, record) {
@@ -91,6 +95,7 @@ class CaseLines {
       told.set(line.one.number, [...(told.get(line.one.number) || []), value]);
     });
     const text = [...told].map(([number, values]) => `case ${number} ${values.join(" and ")}`).join("; ");
+    caption(this.key, ...numbersOf(this.cases));
     document.getElementById(this.key).setAttribute("aria-label",
       `${this.key.replace(/_/g, " ")} in ${this.unit}, now ${text || "no case is shown"}`);
   }
@@ -102,6 +107,8 @@ function studyCharts() {
   const overTime = (y) => (one) => [{ x: one.overMass.time.values, y: y(one) }];
   made.push(new CaseLines("inflow_over_time", time, overTime((one) => one.mass), { unit: "kg/m", fromZero: true }));
   made.push(new CaseLines("zone_over_time", time, overTime((one) => one.overMass.flow_zone_area.values), { unit: "m²", fromZero: true }));
+  made.push(new CaseLines("zone_over_mass", mass, (one) => [{ x: one.mass, y: one.overMass.flow_zone_area.values }],
+    { unit: "m²", fromZero: true, cursor: true }));
   if (!data.models.length) return made;
   const overMass = (keys) => (one) => keys.filter((key) => one.models[model].extremes[key])
     .map((key) => ({ x: one.mass, y: one.models[model].extremes[key].values }));
@@ -110,6 +117,7 @@ function studyCharts() {
     ["shear_over_mass", ["shear_force_max", "shear_force_min"], "shear_force"],
     ["moment_over_mass", ["bending_moment_max", "bending_moment_min"], "bending_moment"],
     ["opening_over_mass", ["joint_opening_max"], "joint_opening"],
+    ["rotation_over_mass", ["joint_rotation_max"], "joint_rotation"],
     ["convergence_over_mass", ["convergence_vertical"], "convergence_vertical"],
   ]) {
     const [unit, factor] = QUANTITIES[quantity];

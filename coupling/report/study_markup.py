@@ -5,7 +5,7 @@ from html import escape
 from coupling.quality import LABELS
 from coupling.report.frame import duration, figure, header, provenance, rows_of_facts, scroll, shown
 from coupling.report.run_markup import RING_CHARTS
-from coupling.report.study_page import value_text
+from coupling.report.study_page import short_names, value_text
 
 #: Of the run's key numbers those that stand in the table of cases, with their short headings.
 COLUMNS = {
@@ -18,15 +18,20 @@ COLUMNS = {
     "bending_moment_max": "largest M",
     "bending_moment_min": "smallest M",
     "joint_opening_max": "joint opening",
-    "convergence_vertical": "vertical diameter shortens by",
+    "convergence_vertical": "vertical convergence",
 }
-TIME_CHARTS = (("inflow_over_time", "Inflow mass", "kg/m"), ("zone_over_time", "Flow zone", "m²"))
+PROGRESS_CHARTS = (
+    ("inflow_over_time", "Inflow mass over time", "kg/m"),
+    ("zone_over_time", "Flow zone over time", "m²"),
+    ("zone_over_mass", "Flow zone over inflow mass", "m²"),
+)
 MASS_CHARTS = (
     ("axial_over_mass", "Largest and smallest N", "kN/m"),
     ("shear_over_mass", "Largest and smallest Q", "kN/m"),
     ("moment_over_mass", "Largest and smallest M", "kN m/m"),
     ("opening_over_mass", "Largest joint opening", "mm"),
-    ("convergence_over_mass", "Vertical diameter shortens by", "mm"),
+    ("rotation_over_mass", "Largest size of joint rotation", "mrad"),
+    ("convergence_over_mass", "Vertical convergence", "mm"),
 )
 
 
@@ -86,8 +91,10 @@ def _design(data, lost):
     return f"""<section aria-labelledby="design">
 <h2 id="design">Design of the study</h2>
 {scroll("design", design)}
+<p class="about">Parameters carry their names in a scene file; numbers are SI, angles degrees, at the tunnel from the
+crown, clockwise.</p>
 <details><summary>The scene of the cases</summary>
-<p class="fine">Where cases differ their values stand beside each other.</p>{scroll("design", facts)}</details>
+<p class="about">Where cases differ their values stand beside each other.</p>{scroll("design", facts)}</details>
 {failed}
 </section>"""
 
@@ -99,7 +106,7 @@ def _results(cases):
     known = {n.key: n for case in finished for n in case["numbers"]}
     columns = [(key, name, known[key]) for key, name in COLUMNS.items() if key in known]
     parameters = list(dict.fromkeys(name for case in finished for name in case["parameters"]))
-    heads = [_sortable("case"), *(_sortable(name) for name in parameters)]
+    heads = [_sortable("case"), *(_sortable(name) for name in short_names(parameters))]
     heads += [_sortable(name, number.unit) for _, name, number in columns]
     heads += [_sortable("processor time", "s"), _sortable("wall time", "s"), _sortable("warnings"),
               '<th scope="col">run</th>']  # fmt: skip
@@ -110,12 +117,10 @@ def _results(cases):
         if errors
         else "No error estimate: one lining model, nothing to compare with"
     )
-    table = (
-        f"<caption>At the last inflow mass that a case reached. {about}. A heading sorts.</caption>"
-        f"<thead><tr>{''.join(heads)}</tr></thead><tbody>{rows}</tbody>"
-    )
+    table = f"<thead><tr>{''.join(heads)}</tr></thead><tbody>{rows}</tbody>"
     return f"""<section aria-labelledby="results">
 <h2 id="results">Cases</h2>
+<p class="about">At the last inflow mass that a case reached. {about}. A heading sorts.</p>
 {scroll("results", f'<table class="numbers cases sortable" id="case-table">{table}</table>')}
 <p class="fine">The error of mesh and time step is not among the estimates; a study over the mesh shows it. Inflow
 masses are fixed, forces lie between the records around them.</p>
@@ -171,14 +176,14 @@ def _links(case):
 def _player(player):
     models = "".join(f'<option value="{k}">{escape(name)}</option>' for k, name in enumerate(player["models"]))
     model = f'<label>Lining model <select id="model">{models}</select></label>' if len(player["models"]) > 1 else ""
-    over_time = "".join(figure(key, title, unit, "svg") for key, title, unit in TIME_CHARTS)
+    progress = "".join(figure(key, title, unit, "svg") for key, title, unit in PROGRESS_CHARTS)
     around = "".join(
         figure(key, title, unit, "svg") for key, title, unit in RING_CHARTS[: 6 if player["models"] else 3]
     )
     over_mass = "".join(figure(key, title, unit, "svg") for key, title, unit in MASS_CHARTS) if models else ""
     forces = (
         f'<section aria-labelledby="extremes"><h3 id="extremes">Extremes over inflow mass</h3>'
-        f'<div class="grid">{over_mass}</div></section>'
+        f'<div class="grid three">{over_mass}</div></section>'
         if models
         else ""
     )
@@ -201,10 +206,13 @@ Page Up and Page Down leap, space plays.</p>
 <label>Show <select id="against"><option value="value">values</option>
 <option value="change">change since the gap opened</option></select></label>{model}</div>
 <section aria-labelledby="around"><h3 id="around">Around the lining at this inflow mass</h3>
-<div class="grid">{around}</div></section>
-<section aria-labelledby="over-time"><h3 id="over-time">Over time</h3><div class="grid wide">{over_time}</div></section>
+<div class="grid three">{around}</div></section>
+<section aria-labelledby="progress"><h3 id="progress">Progress of the gushing</h3>
+<p class="about">Lines join the inflow masses at which cases are compared; dots are at the slider's inflow mass.</p>
+<div class="grid three">{progress}</div></section>
 {forces}
 <h3 id="now-title">Cases at this inflow mass</h3>
+<p class="about">Values of the inflow mass nearest to the slider; below each value its change since the gap opened.</p>
 {scroll("now-title", table)}
 </section>"""
 
@@ -225,12 +233,10 @@ def _trust(cases):
             f'<tr data-trust="{case["number"]}"><th scope="row" data-value="{case["number"]}">{case["number"]}</th>'
             f"{cells}<td>{f'<ul>{told}</ul>' if told else 'none'}</td></tr>"
         )
-    table = (
-        "<caption>Largest errors of a case by its own account: changes of mass over the initial mass, departures of "
-        "momentum, energy and contact over what drives them, shares of points; unbalanced force of the ring over its "
-        f"loads.</caption><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody>"
-    )
+    table = f"<thead><tr>{heads}</tr></thead><tbody>{rows}</tbody>"
     return f"""<section aria-labelledby="trust">
 <h2 id="trust">Balances and warnings</h2>
+<p class="about">Largest errors of a case by its own account: changes of mass over the initial mass; departures of
+momentum, energy and contact over what drives them; shares of points; unbalanced force of the ring over its loads.</p>
 {scroll("trust", f'<table class="numbers cases sortable">{table}</table>')}
 </section>"""

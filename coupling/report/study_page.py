@@ -8,12 +8,12 @@ import numpy as np
 from coupling.report.packing import evenly, packed
 from coupling.report.scene_facts import facts
 from coupling.report.study_numbers import NOT_RUN, balances, case_numbers, case_warnings, last_record, run_facts
-from coupling.report.study_series import MOST_CASES, budget, case_series, slider_stops
+from coupling.report.study_series import MOST_CASES, MOST_RECORDS, budget, case_series, slider_stops
 from coupling.run_folder import LOG_FILE, REPORT_FILE
 from coupling.studies.case import RUN_FOLDER
 from coupling.studies.collect import collect as collect_cases
-from coupling.studies.collect import stored_cases
-from coupling.studies.design import Range
+from coupling.studies.collect import stored_cases, unreadable
+from coupling.studies.design import Range, StudyError
 from coupling.studies.execute import case_file
 
 SCRIPTS = (
@@ -43,7 +43,7 @@ def collect(folder, beside):
     Raises
     ------
     coupling.studies.design.StudyError
-        The definition, or a scene of it, cannot be read.
+        The definition, a scene of it, or what a case left cannot be read.
     """
     plan, found, failures = stored_cases(folder)
     dataset = collect_cases(plan, found, Path(folder), failures)
@@ -52,21 +52,23 @@ def collect(folder, beside):
     for case in found:
         one = None
         if case in done:
-            one = whole[case.index] = dataset.sel(case=case.index).load()
+            one = whole[case.index] = _loaded(dataset, case, case_file(Path(folder), case))
         rows.append(_row(case, one, failures.get(case.key), case_file(Path(folder), case).parent, Path(beside)))
     drawn = [case for case in done if last_record(whole[case.index]) is not None]
     chosen = [drawn[k] for k in evenly(len(drawn), MOST_CASES)] if drawn else []
     for row in rows:
         row["drawn"] = row["number"] in {case.index for case in chosen}
-    step, records = budget(dataset, len(chosen)) if chosen else (1, np.zeros(0, int))
+    kept = evenly(dataset.sizes["progress"], MOST_RECORDS) if chosen else np.zeros(0, int)
+    step, records = budget(dataset.isel(progress=kept), len(chosen)) if chosen else (1, kept)
+    shown = {case.index: whole[case.index].isel(progress=kept) for case in chosen}
     return {
         "name": plan.name,
         "attributes": dataset.attrs,
         "design": _design(plan, found, done),
         "facts": _shared_facts(found),
         "cases": rows,
-        "notes": _thinned(dataset, step, records, len(chosen), len(drawn)),
-        "player": _player(dataset, whole, chosen, rows, step, records),
+        "notes": _thinned(dataset, step, len(records), len(chosen), len(drawn)),
+        "player": _player(dataset, shown, chosen, rows, step, records),
     }
 
 
@@ -75,7 +77,7 @@ def _player(dataset, whole, chosen, rows, step, records):
         return {"cases": []}
     labels = {row["number"]: row["label"] for row in rows}
     return {
-        "stops": packed(slider_stops(dataset.sel(case=[case.index for case in chosen]), records)),
+        "stops": packed(slider_stops([whole[case.index] for case in chosen], records)),
         "records": records.tolist(),
         "theta": dataset["theta"].values[::step].tolist(),
         "theta_ring": dataset["theta_ring"].values[::step].tolist() if "theta_ring" in dataset.dims else [],
@@ -90,6 +92,13 @@ def _player(dataset, whole, chosen, rows, step, records):
             for case in chosen
         ],
     }
+
+
+def _loaded(dataset, case, file):
+    try:
+        return dataset.sel(case=case.index).load()
+    except (OSError, RuntimeError, ValueError, KeyError) as error:
+        raise StudyError(unreadable(file, error)) from None
 
 
 def _row(case, dataset, failure, folder, beside):
@@ -119,10 +128,15 @@ def _row(case, dataset, failure, folder, beside):
 
 
 def label(parameters):
-    """The parameters of a case in a few words: names without their table where they stay different."""
+    """The parameters of a case in a few words."""
+    names = short_names(parameters)
+    return ", ".join(f"{name} {value_text(value)}" for name, value in zip(names, parameters.values(), strict=True))
+
+
+def short_names(parameters):
+    """Names of parameters without their table, where they stay different."""
     short = [name.rpartition(".")[2] for name in parameters]
-    names = short if len(set(short)) == len(short) else list(parameters)
-    return ", ".join(f"{name} {value_text(parameters[key])}" for name, key in zip(names, parameters, strict=True))
+    return short if len(set(short)) == len(short) else list(parameters)
 
 
 def value_text(value):
@@ -181,6 +195,6 @@ def _thinned(dataset, step, records, chosen, drawn):
         told.append(f"Charts hold {chosen} of {drawn} finished cases, evenly chosen; the tables hold them all.")
     if step > 1:
         told.append(f"Curves around the ring show every {step}. value; extremes are taken from all of them.")
-    if drawn and len(records) < dataset.sizes["progress"]:
-        told.append(f"Curves around the ring are shown at {len(records)} of {dataset.sizes['progress']} inflow masses.")
+    if drawn and records < dataset.sizes["progress"]:
+        told.append(f"Curves around the ring are shown at {records} of {dataset.sizes['progress']} inflow masses.")
     return told

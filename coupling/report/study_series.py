@@ -8,10 +8,10 @@ from coupling.report.packing import evenly, packed, packed_levels
 PRESSURES = ("soil_pressure", "water_pressure", "soil_shear")
 FORCES = ("axial_force", "shear_force", "bending_moment")
 OVER_MASS = ("time", "flow_zone_area", "disturbed_area")
-BYTES_OF_CURVES = 6.5e6  # text of everything that has a value for each angle
+BYTES_OF_CURVES = 5.2e6  # text of everything that has a value for each angle
 BYTES_OF_VALUE = 8 / 3  # two bytes, as base64
 ANGLE_STEPS = (1, 2, 3, 4)  # take every so many values around the ring before leaving out inflow masses
-MOST_CASES, MOST_STOPS = 60, 240
+MOST_CASES, MOST_RECORDS, MOST_STOPS = 60, 121, 240
 
 
 def budget(dataset, count):
@@ -20,7 +20,7 @@ def budget(dataset, count):
     Parameters
     ----------
     dataset : xarray.Dataset
-        From :func:`coupling.read_study`.
+        From :func:`coupling.read_study`, at most MOST_RECORDS inflow masses of it.
     count : int
 
     Returns
@@ -36,9 +36,10 @@ def budget(dataset, count):
     return step, evenly(records, max(2, int(most * step)))
 
 
-def slider_stops(dataset, records):
+def slider_stops(datasets, records):
     """Inflow masses that the slider stops at: all that any case has, ascending, (n,) float64 [kg/m]."""
-    masses = np.unique(np.round(dataset["inflow_mass"].isel(progress=records).values, 9))
+    masses = np.concatenate([dataset["inflow_mass"].values[records] for dataset in datasets])
+    masses = np.unique(np.round(masses, 9))
     masses = masses[np.isfinite(masses)]
     return masses[evenly(len(masses), MOST_STOPS)]
 

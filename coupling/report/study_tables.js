@@ -6,7 +6,7 @@ const NOW_COLUMNS = [
     (one, r) => one.extremes[`${key}_max`].values[r]]),
   ...[["axial_force_max", "largest N"], ["axial_force_min", "smallest N"], ["shear_force_max", "largest Q"],
     ["shear_force_min", "smallest Q"], ["bending_moment_max", "largest M"], ["bending_moment_min", "smallest M"],
-    ["joint_opening_max", "joint opening"], ["convergence_vertical", "vertical diameter shortens by"]].map(([key, name]) => {
+    ["joint_opening_max", "joint opening"], ["convergence_vertical", "vertical convergence"]].map(([key, name]) => {
     const [unit, factor] = QUANTITIES[key.replace(/_(max|min)$/, "")];
     return [key, name, unit, factor, (one, r) => one.models[model]?.extremes[key]?.values[r]];
   }),
@@ -47,7 +47,7 @@ class NowTable {
   build() {
     this.table = document.getElementById("now-table");
     this.columns = NOW_COLUMNS.filter(([key]) => cases.some((one) => Number.isFinite(NOW_COLUMNS.find((c) => c[0] === key)[4](one, 0))));
-    this.body = tableWith(this.table, "Values of the inflow mass nearest to the slider; below each value its change since the gap opened.",
+    this.body = tableWith(this.table, "",
       [["case", false], ["parameters", false], ["inflow mass [kg/m]", true], ...this.columns.map(([, name, unit]) => [`${name} [${unit}]`, true])]);
     for (const heading of this.table.tHead.rows[0].cells) {
       const button = document.createElement("button");
@@ -56,6 +56,7 @@ class NowTable {
       button.append(...heading.childNodes);
       heading.append(button);
       heading.setAttribute("aria-sort", "none");
+      if (heading.cellIndex === 1) heading.classList.add("text");
     }
   }
   draw(frame) {
@@ -64,7 +65,7 @@ class NowTable {
       const at = recordAt(one, frame), row = this.body.insertRow();
       row.dataset.now = one.number;
       cell(row, String(one.number), { head: "row" }).dataset.value = one.number;
-      cell(row, one.label);
+      cell(row, one.label).className = "text";
       const filled = (text, value, small = null) => { cell(row, text, { number: true, small }).dataset.value = Number.isFinite(value) ? value : ""; };
       filled(at ? shown(one.mass[at.record]) : "not reached", at ? one.mass[at.record] : NaN);
       for (const [key, , , factor, value] of this.columns) {

@@ -15,7 +15,7 @@ function cell(row, text, { head = null, number = false, small = null } = {}) {
 
 function tableWith(table, text, headings) {
   table.replaceChildren();
-  table.createCaption().textContent = text;
+  if (text) table.createCaption().textContent = text;
   const row = table.createTHead().insertRow();
   for (const [name, number] of headings) cell(row, name, { head: "col", number });
   return table.createTBody();
