@@ -38,6 +38,11 @@ def study(folder):
 
 
 @pytest.fixture(scope="module")
+def collected(folder):
+    return study_page.collect(folder, folder)
+
+
+@pytest.fixture(scope="module")
 def browser():
     if find_browser() is None:
         pytest.skip("no Chromium on this machine; Debian: apt-get install chromium-headless-shell")
@@ -64,8 +69,8 @@ def opened(report, browser):
 # -- without a browser ------------------------------------------------------------------------------
 
 
-def test_curves_are_within_half_a_level_and_series_equal_the_dataset(folder, study):
-    player = study_page.collect(folder, folder)["player"]
+def test_curves_are_within_half_a_level_and_series_equal_the_dataset(collected, study):
+    player = collected["player"]
     assert [case["number"] for case in player["cases"]] == CASES and player["records"] == list(range(5))
     for case in player["cases"]:
         one = study.sel(case=case["number"])
@@ -99,13 +104,13 @@ def test_a_case_that_ended_early_and_a_ring_out_of_balance_are_warned_of(folder,
 @pytest.mark.parametrize(
     ("count", "records", "step", "kept"), [(4, 41, 1, 41), (20, 41, 2, 41), (50, 41, 4, 41), (400, 121, 4, 40)]
 )
-def test_a_page_of_many_cases_stays_under_ten_megabytes(folder, study, count, records, step, kept):
+def test_a_page_of_many_cases_stays_under_ten_megabytes(collected, study, count, records, step, kept):
     one = study.sel(case=0).interp(progress=np.linspace(0, 1, records))
     chosen = min(count, study_series.MOST_CASES)
     found, at = study_series.budget(one, chosen)
     assert (found, len(at), at[0], at[-1]) == (step, kept, 0, records - 1)
     curves = chosen * len(json.dumps(study_series.case_series(one, found, at)))
-    row = study_page.collect(folder, folder)["cases"][0]
+    row = collected["cases"][0]
     tables = count * len(study_markup._results([row]) + study_markup._trust([row]))
     # style and script are 0.06 MB
     assert curves + tables < 9.9e6
