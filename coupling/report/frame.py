@@ -117,9 +117,13 @@ def figure(key, title, unit, kind, extra=""):
     )
 
 
-def scroll(label, table):
-    """A table that scrolls sideways where it is wider than the screen; `label`: id of its heading."""
-    return f'<div class="scroll" role="region" aria-labelledby="{label}" tabindex="0">{table}</div>'
+def scroll(label, table, tall=False):
+    """A table that scrolls sideways where it is wider than the screen, and within itself where it is `tall`.
+
+    label : id of its heading.
+    """
+    kind = "scroll tall" if tall else "scroll"
+    return f'<div class="{kind}" role="region" aria-labelledby="{label}" tabindex="0">{table}</div>'
 
 
 def rows_of_facts(facts):

@@ -28,7 +28,8 @@ class RingComparison {
     return against === "change" ? row.map((value, j) => value - start[j]) : row;
   }
   build() {
-    this.cases = visible();
+    // a case without a ring has pressures only
+    this.cases = visible().filter((one) => PRESSURES.includes(this.key) || one.models.length);
     const svg = document.getElementById(this.key), records = Array.from(data.records.keys());
     const range = roundRange(rangeOf(this.cases.flatMap((one) => records.map((r) => this.row(one, r))), this.factor), true);
     const options = { x: this.angles, yRange: range, marks: gapMarks(this.cases), classes: this.cases.map(() => "line"),
@@ -110,7 +111,7 @@ function studyCharts() {
   made.push(new CaseLines("zone_over_mass", mass, (one) => [{ x: one.mass, y: one.overMass.flow_zone_area.values }],
     { unit: "m²", fromZero: true, cursor: true }));
   if (!data.models.length) return made;
-  const overMass = (keys) => (one) => keys.filter((key) => one.models[model].extremes[key])
+  const overMass = (keys) => (one) => keys.filter((key) => one.models[model]?.extremes[key])
     .map((key) => ({ x: one.mass, y: one.models[model].extremes[key].values }));
   for (const [chart, keys, quantity] of [
     ["axial_over_mass", ["axial_force_max", "axial_force_min"], "axial_force"],

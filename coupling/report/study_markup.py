@@ -54,7 +54,7 @@ def parts(data):
         sections.append(_player(data["player"]))
     sections.append(_trust(cases))
     attributes = data["attributes"]
-    made = f"cases collected {attributes['history'][:16].replace('T', ' ')}"
+    made = f"first case of {attributes['created']}" if "created" in attributes else ""
     return title, {
         "skip": ("player", "To the charts") if data["player"]["cases"] else ("results", "To the cases"),
         "header": header(title, _lead(data, done), _status(done, len(cases)), warned, data["notes"]),
@@ -121,7 +121,7 @@ def _results(cases):
     return f"""<section aria-labelledby="results">
 <h2 id="results">Cases</h2>
 <p class="about">At the last inflow mass that a case reached. {about}. A heading sorts.</p>
-{scroll("results", f'<table class="numbers cases sortable" id="case-table">{table}</table>')}
+{scroll("results", f'<table class="numbers cases sortable" id="case-table">{table}</table>', tall=len(finished) > 15)}
 <p class="fine">The error of mesh and time step is not among the estimates; a study over the mesh shows it. Inflow
 masses are fixed, forces lie between the records around them.</p>
 </section>"""
@@ -238,5 +238,5 @@ def _trust(cases):
 <h2 id="trust">Balances and warnings</h2>
 <p class="about">Largest errors of a case by its own account: changes of mass over the initial mass; departures of
 momentum, energy and contact over what drives them; shares of points; unbalanced force of the ring over its loads.</p>
-{scroll("trust", f'<table class="numbers cases sortable">{table}</table>')}
+{scroll("trust", f'<table class="numbers cases sortable">{table}</table>', tall=len(finished) > 15)}
 </section>"""

@@ -11,7 +11,6 @@ from coupling.report.numbers import (
     Number,
     initial_theory,
 )
-from coupling.report.study_series import ring_extremes_over_mass
 
 #: Columns of the table of cases that are the case's own; those of the ring follow.
 INFLOW_NUMBERS = (
@@ -30,13 +29,15 @@ def last_record(dataset):
     return int(reached[-1]) if len(reached) else None
 
 
-def case_numbers(dataset):
+def case_numbers(dataset, models):
     """Key numbers of one case at the last inflow mass that it reached, beside those of the start.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         The case, in memory.
+    models : list of dict
+        From :func:`coupling.report.study_series.ring_extremes_over_mass`, one for each lining model.
 
     Returns
     -------
@@ -51,8 +52,6 @@ def case_numbers(dataset):
         for name, label, unit in INFLOW_NUMBERS
         if name in dataset.variables
     ]
-    names = list(dataset["model"].values) if "model" in dataset.dims else []
-    models = [ring_extremes_over_mass(dataset.sel(model=name)) for name in names]
     for key, (label, unit, scale) in RING_EXTREMES.items() if models else ():
         values = [model[key] for model in models if key in model]
         if not values:

@@ -3,15 +3,20 @@
 import os
 from pathlib import Path
 
-import numpy as np
-
+from coupling.netcdf_group import read_group_at_once
 from coupling.report.packing import evenly, packed
 from coupling.report.scene_facts import facts
 from coupling.report.study_numbers import NOT_RUN, balances, case_numbers, case_warnings, last_record, run_facts
-from coupling.report.study_series import MOST_CASES, MOST_RECORDS, budget, case_series, slider_stops
+from coupling.report.study_series import (
+    MOST_CASES,
+    MOST_RECORDS,
+    budget,
+    case_series,
+    ring_extremes_over_mass,
+    slider_stops,
+)
 from coupling.run_folder import LOG_FILE, REPORT_FILE
 from coupling.studies.case import RUN_FOLDER
-from coupling.studies.collect import collect as collect_cases
 from coupling.studies.collect import stored_cases, unreadable
 from coupling.studies.design import Range, StudyError
 from coupling.studies.execute import case_file
@@ -46,33 +51,36 @@ def collect(folder, beside):
         The definition, a scene of it, or what a case left cannot be read.
     """
     plan, found, failures = stored_cases(folder)
-    dataset = collect_cases(plan, found, Path(folder), failures)
-    done = [case for case in found if str(dataset["status"].sel(case=case.index).values) == "finished"]
-    rows, whole = [], {}
+    done = [case for case in found if case_file(Path(folder), case).is_file()]
+    rows, whole, extremes = [], {}, {}
     for case in found:
-        one = None
+        one, file = None, case_file(Path(folder), case)
         if case in done:
-            one = whole[case.index] = _loaded(dataset, case, case_file(Path(folder), case))
-        rows.append(_row(case, one, failures.get(case.key), case_file(Path(folder), case).parent, Path(beside)))
+            one = whole[case.index] = _loaded(file, plan.backends)
+            extremes[case.index] = ring_extremes_over_mass(one)
+        rows.append(_row(case, one, extremes.get(case.index), failures.get(case.key), file.parent, Path(beside)))
     drawn = [case for case in done if last_record(whole[case.index]) is not None]
     chosen = [drawn[k] for k in evenly(len(drawn), MOST_CASES)] if drawn else []
     for row in rows:
         row["drawn"] = row["number"] in {case.index for case in chosen}
-    kept = evenly(dataset.sizes["progress"], MOST_RECORDS) if chosen else np.zeros(0, int)
-    step, records = budget(dataset.isel(progress=kept), len(chosen)) if chosen else (1, kept)
+    kept = evenly(plan.records, MOST_RECORDS)
     shown = {case.index: whole[case.index].isel(progress=kept) for case in chosen}
+    extremes = {k: [{key: v[kept] for key, v in model.items()} for model in extremes[k]] for k in shown}
+    # of a case with a ring, if there is one
+    widest = max(shown.values(), key=lambda one: one.sizes.get("theta_ring", 0), default=None)
+    step, records = (1, kept) if widest is None else budget(widest, len(chosen))
     return {
         "name": plan.name,
-        "attributes": dataset.attrs,
+        "attributes": next(iter(whole.values())).attrs if whole else {},
         "design": _design(plan, found, done),
         "facts": _shared_facts(found),
         "cases": rows,
-        "notes": _thinned(dataset, step, len(records), len(chosen), len(drawn)),
-        "player": _player(dataset, shown, chosen, rows, step, records),
+        "notes": _thinned(plan.records, step, len(records), len(chosen), len(drawn)),
+        "player": _player(widest, shown, extremes, chosen, rows, step, records),
     }
 
 
-def _player(dataset, whole, chosen, rows, step, records):
+def _player(dataset, whole, extremes, chosen, rows, step, records):
     if not chosen:
         return {"cases": []}
     labels = {row["number"]: row["label"] for row in rows}
@@ -87,21 +95,24 @@ def _player(dataset, whole, chosen, rows, step, records):
                 "number": case.index,
                 "label": labels[case.index],
                 "gate": None if case.scene.mpm.gate is None else case.scene.mpm.gate.angle,
-                **case_series(whole[case.index], step, records),
+                **case_series(whole[case.index], extremes[case.index], step, records),
             }
             for case in chosen
         ],
     }
 
 
-def _loaded(dataset, case, file):
+def _loaded(file, models):
+    """The dataset of a case, in memory, with all lining models of the study in their order."""
     try:
-        return dataset.sel(case=case.index).load()
-    except (OSError, RuntimeError, ValueError, KeyError) as error:
+        dataset = read_group_at_once(file)
+        same = "model" not in dataset.dims or tuple(dataset["model"].values) == tuple(models)
+        return dataset if same else dataset.reindex(model=list(models))
+    except (OSError, RuntimeError, ValueError, KeyError, AttributeError) as error:
         raise StudyError(unreadable(file, error)) from None
 
 
-def _row(case, dataset, failure, folder, beside):
+def _row(case, dataset, extremes, failure, folder, beside):
     run = folder / RUN_FOLDER
     stored = run_facts(run)
     if dataset is not None:
@@ -116,7 +127,7 @@ def _row(case, dataset, failure, folder, beside):
         "parameters": case.parameters,
         "status": status,
         "message": message,
-        "numbers": [] if dataset is None else case_numbers(dataset),
+        "numbers": [] if dataset is None else case_numbers(dataset, extremes),
         "balances": {} if dataset is None else balances(dataset),
         "warnings": [] if dataset is None else case_warnings(dataset, case.scene),
         "cpu_seconds": None if dataset is None else float(dataset["cpu_seconds"]),
@@ -189,12 +200,12 @@ def _shared_facts(found):
     return shown
 
 
-def _thinned(dataset, step, records, chosen, drawn):
+def _thinned(whole, step, records, chosen, drawn):
     told = []
     if chosen < drawn:
         told.append(f"Charts hold {chosen} of {drawn} finished cases, evenly chosen; the tables hold them all.")
     if step > 1:
         told.append(f"Curves around the ring show every {step}. value; extremes are taken from all of them.")
-    if drawn and records < dataset.sizes["progress"]:
-        told.append(f"Curves around the ring are shown at {records} of {dataset.sizes['progress']} inflow masses.")
+    if drawn and records < whole:
+        told.append(f"Curves around the ring are shown at {records} of {whole} inflow masses.")
     return told

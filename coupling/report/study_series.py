@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from coupling.postprocess import extremes
 from coupling.report.packing import evenly, packed, packed_levels
 
 PRESSURES = ("soil_pressure", "water_pressure", "soil_shear")
@@ -44,13 +43,15 @@ def slider_stops(datasets, records):
     return masses[evenly(len(masses), MOST_STOPS)]
 
 
-def case_series(dataset, step, records):
+def case_series(dataset, extremes_of_models, step, records):
     """One case for the script.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         The case, in memory.
+    extremes_of_models : list of dict
+        From :func:`ring_extremes_over_mass`, one for each lining model.
     step, records
         From :func:`budget`.
 
@@ -64,11 +65,11 @@ def case_series(dataset, step, records):
     kept = dataset.isel(progress=records)
     around = {name: kept[name].values[:, ::step] for name in PRESSURES}
     models = []
-    for name in dataset["model"].values if "model" in dataset.dims else ():
-        model = kept.sel(model=name)
+    for k, found in enumerate(extremes_of_models):
+        model = kept.isel(model=k)
         models.append({
             "forces": {force: packed_levels(model[force].values[:, ::step]) for force in FORCES},
-            "extremes": {key: packed(v) for key, v in ring_extremes_over_mass(dataset.sel(model=name)).items()},
+            "extremes": {key: packed(values) for key, values in found.items()},
         })  # fmt: skip
     return {
         "mass": packed(dataset["inflow_mass"].values),
@@ -81,15 +82,29 @@ def case_series(dataset, step, records):
 
 def pressure_extremes(dataset):
     """Extremes of the pressures around the lining and where they are: NAME_max, NAME_max_angle .. (n_progress,) SI."""
-    return _values(extremes(dataset, PRESSURES, "theta"))
+    return _around(dataset, PRESSURES, "theta")
 
 
-def ring_extremes_over_mass(model):
-    """Extremes of a lining model's answer: keys of :data:`coupling.report.numbers.RING_EXTREMES` to (n_progress,) SI.
+def ring_extremes_over_mass(dataset):
+    """Extremes of every lining model's answer, over inflow mass.
 
-    model : xarray.Dataset (progress, theta_ring, joint);  for forces also KEY_angle [degree], where the extreme is.
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A case, in memory.
+
+    Returns
+    -------
+    list of dict
+        For each of its models: keys of :data:`coupling.report.numbers.RING_EXTREMES` to (n_progress,) SI; for forces
+        also KEY_angle [degree], where the extreme is.
     """
-    found = _values(extremes(model, FORCES, "theta_ring"))
+    count = dataset.sizes.get("model", 0)
+    return [_extremes_of(dataset.isel(model=k)) for k in range(count)]
+
+
+def _extremes_of(model):
+    found = _around(model, FORCES, "theta_ring")
     if model.sizes.get("joint"):
         found["joint_opening_max"] = model["joint_opening"].max("joint").values
         found["joint_rotation_max"] = abs(model["joint_rotation"]).max("joint").values
@@ -99,5 +114,17 @@ def ring_extremes_over_mass(model):
     return found
 
 
-def _values(found):
-    return {name: variable.values for name, variable in found.data_vars.items()}
+def _around(dataset, names, along):
+    """As :func:`coupling.postprocess.extremes` of a dataset over `progress`, plain arrays; NaN where no value is known.
+
+    returns dict: NAME_max, NAME_max_angle, NAME_min, NAME_min_angle to (n_progress,).
+    """
+    found, angles = {}, dataset[along].values
+    for name in names:
+        values = dataset[name].transpose("progress", along).values
+        known = np.isfinite(values).any(axis=1)
+        for extreme, sign in (("max", 1.0), ("min", -1.0)):
+            at = np.argmax(np.where(np.isnan(values), -np.inf, sign * values), axis=1)
+            found[f"{name}_{extreme}"] = np.take_along_axis(values, at[:, None], axis=1)[:, 0]
+            found[f"{name}_{extreme}_angle"] = np.where(known, angles[at], np.nan)
+    return found
