@@ -199,6 +199,7 @@ def test_the_page_is_alone_and_names_the_design_and_what_failed(opened, report):
     )
     assert design["gate.angle"] == "90, 45" and design["soils.0.friction_angle"] == "25, 35"
     assert design["scene"] == "quick" and design["lining models"] == "beam-spring, continuum"
+    assert design["cases"] == "4; 3 finished, 1 failed, 0 not run"
     lost = opened.evaluate("document.querySelector('[data-lost]').innerText")
     assert lost.startswith("3\tangle 45, friction_angle 35\tfailed") and REASON in lost
 

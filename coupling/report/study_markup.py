@@ -48,7 +48,7 @@ def parts(data):
         warned = [*warned[:5], f"{len(warned) - 5} more are named in the table of balances and warnings."]
     lost = [case for case in cases if case["status"] != "finished"]
     if lost:
-        warned.insert(0, f"{len(lost)} of {len(cases)} cases are not finished; the reasons are below the design.")
+        warned.insert(0, f"Without a result: {len(lost)} of {len(cases)} cases; the reasons stand below the design.")
     sections = [_design(data, lost), _results(cases)]
     if data["player"]["cases"]:
         sections.append(_player(data["player"]))
@@ -78,7 +78,8 @@ def _design(data, lost):
     if lost:
         rows = "".join(
             f'<tr data-lost="{case["number"]}"><th scope="row">{case["number"]}</th><td>{escape(case["label"])}</td>'
-            f"<td>{escape(case['status'])}</td><td>{escape(case['message'])}</td><td>{_links(case)}</td></tr>"
+            f'<td>{escape(case["status"])}</td><td class="reason">{escape(case["message"])}</td>'
+            f"<td>{_links(case)}</td></tr>"
             for case in lost
         )
         table = (

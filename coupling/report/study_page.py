@@ -72,7 +72,7 @@ def collect(folder, beside):
     return {
         "name": plan.name,
         "attributes": next(iter(whole.values())).attrs if whole else {},
-        "design": _design(plan, found, done),
+        "design": _design(plan, found, done, sum(row["status"] == "failed" for row in rows)),
         "facts": _shared_facts(found),
         "cases": rows,
         "notes": _thinned(plan.records, step, len(records), len(chosen), len(drawn)),
@@ -159,7 +159,7 @@ def _relative(path, beside):
     return Path(os.path.relpath(path, beside)).as_posix()
 
 
-def _design(plan, found, done):
+def _design(plan, found, done, failed):
     kinds = {
         "factorial": "all combinations of the values", "list": "the first values of all lists, then the second, ..",
         "one-at-a-time": "the scene as it is, then every value alone", "latin-hypercube": "latin hypercube samples",
@@ -177,7 +177,9 @@ def _design(plan, found, done):
     rows += [(f"{name} (all cases)", value_text(value)) for name, value in plan.fixed.items()]
     rows.append(("lining models", ", ".join(plan.backends)))
     rows.append(("compared at", f"{plan.records} inflow masses of every case"))
-    rows.append(("cases", f"{len(found)}, {len(done)} finished"))
+    rows.append(
+        ("cases", f"{len(found)}; {len(done)} finished, {failed} failed, {len(found) - len(done) - failed} not run")
+    )
     return rows
 
 
