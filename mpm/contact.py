@@ -462,19 +462,21 @@ def remap_kernel(wet):
 
 
 @kernel
-def smooth_rates(first, last, which, means, momenta, sums, nodes):
+def smooth_rates(first, last, which, means, momenta, sums, nodes, fill):
     """Nodal means of the divergences and of the gradient of the projected pressure (Detournay & Dzik 2006).
 
     Within a level. What the step has read of these rows is cleared for what comes next.
 
     which : (n_rows,) int32
         The rows, by level.
-    means : (n_parts, n_rows, 7) float64, of `element_rates`. A row without weight keeps what it had.
+    means : (n_parts, n_rows, 9) float64, of `element_rates`. A row without weight keeps what it had.
+    fill : (n_rows,) float64
+        Written: volume over area of the elements with points [-].
     momenta, sums : (n_parts, n_rows, 4), (n_parts, n_rows, 13) float64
     """
     for k in range(first, last):
         i = which[k]
-        volume = ts = wet = ws = wl = gx = gy = 0.0
+        volume = ts = wet = ws = wl = gx = gy = spread = area = 0.0
         for part in range(means.shape[0]):
             volume += means[part, i, 0]
             ts += means[part, i, 1]
@@ -483,6 +485,8 @@ def smooth_rates(first, last, which, means, momenta, sums, nodes):
             wl += means[part, i, 4]
             gx += means[part, i, 5]
             gy += means[part, i, 6]
+            spread += means[part, i, 7]
+            area += means[part, i, 8]
             for column in range(NODAL_MEANS):
                 means[part, i, column] = 0.0
             for column in range(NODAL_MOMENTA):
@@ -490,9 +494,10 @@ def smooth_rates(first, last, which, means, momenta, sums, nodes):
             for column in range(BUFFER_WIDTH):
                 sums[part, i, column] = 0.0
         if volume > 0.0:
+            fill[i] = volume / area
             nodes[i, V_TS] = ts / volume
         if wet > 0.0:
             nodes[i, V_WS] = ws / wet
-            nodes[i, V_WL] = wl / wet
+            nodes[i, V_WL] = ws / wet + wl / spread
             nodes[i, V_GX] = gx / wet
             nodes[i, V_GY] = gy / wet

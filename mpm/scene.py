@@ -210,11 +210,19 @@ class Tunnel(Part):
 
 
 class Gate(Part):
-    """The gap through the lining: straight walls of the given distance, along the radius at `angle`."""
+    """The gap through the lining: straight walls of the given distance, along the radius at `angle`.
+
+    Parameters
+    ----------
+    corners : str
+        What the nodes at the outer edges of the open gap do: "held", they stand still, so that nothing passes through
+        the faces on either side of them; "slipping", they follow the channel's walls, and the face beside them leaks.
+    """
 
     tunnel: int = Field(default=0, ge=0)
     angle: Angle = Field(ge=0, lt=360)
     width: Length = Field(ge=1e-3)  # through less no grain of sand goes
+    corners: Literal["held", "slipping"] = "held"
 
 
 class Discretisation(Part):

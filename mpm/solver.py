@@ -111,6 +111,7 @@ class Solver:
         self.status = np.zeros(n, np.int8)
         self.rates = np.zeros((m, RATE_WIDTH))
         self.volume = np.zeros((m, 2))
+        self.fill = np.zeros(n_rows)
         self.ahead, self._periods = np.zeros(m), np.ones(self.levels.count, np.int64)  # equal steps: nothing runs ahead
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
         self.threads = 1 if m < SMALLEST_PARALLEL else max(1, min(threads or cores, PARTS))
@@ -396,12 +397,12 @@ class Solver:
 
     def _element_rates(self, up_to=-1):
         self.over_elements(
-            self._rates, self.occupied, self.levels.rows, self.geometry, self.nodes, self.volume, self.rates,
+            self._rates, self.occupied, self.levels.rows, self.geometry, self.nodes, self.volume, self.fill, self.rates,
             per_range=(self.nodal_means,), up_to=up_to,
         )  # fmt: skip
         self._over(
             self._row_cuts[up_to], smooth_rates,
-            (self.levels.row_order, self.nodal_means, self.momenta, self.sums, self.nodes), (),
+            (self.levels.row_order, self.nodal_means, self.momenta, self.sums, self.nodes, self.fill), (),
         )  # fmt: skip
         self.nodes[self.mirror_rows, V_GX] = 0.0
 
@@ -421,7 +422,7 @@ class Solver:
         return self.over_elements(
             self._update, self.occupied, self.start, self.order, self.points, self.soil_of_point, self.soils,
             self._water_density, self._water_modulus, self.levels.rows, self.geometry, self.nodes, self.rates,
-            self.volume, self.levels.of_element, dt_of_level, self.ahead, advance, self.limit_speed,
+            self.volume, self.fill, self.levels.of_element, dt_of_level, self.ahead, advance, self.limit_speed,
             self.element_of_point,
             per_range=(self.clamps, self.sums, self._left), up_to=up_to,
         )  # fmt: skip
@@ -442,14 +443,17 @@ class Solver:
         return steps, residual
 
     def open_gate(self):
-        """Take the plug away: the opening is free, its corners belong to the channel walls."""
+        """Take the plug away: the opening is free, its corners stand still or belong to the channel walls."""
         self.normal = self._normal_open
         self.active = self._active_open
+        if self.scene.gate.corners == "held":
+            self.fixed[self.mesh.corner_nodes] |= FIXED_X | FIXED_Y
         self.gate_open = True
 
     def close_gate(self):
         """Put the plug back: what is in the channel stays there, and nothing follows through the face."""
         self.normal, self.active = self._closed
+        self.fixed[self.mesh.corner_nodes] &= ~(FIXED_X | FIXED_Y)
         self.gate_open = False
 
     def step(self, dt_max=math.inf):
@@ -481,6 +485,7 @@ class Solver:
         """One step of the finest level: levels up to `begun` begin their own now, those up to `finished` end it."""
         numerics, density, levels = self.scene.numerics, self._water_density, self.levels
         smallest = float(dt_of_level[0]) / self._finest_step  # of level 0, as the limits
+        filtered = 1.0 - (1.0 - numerics.pressure_filter) ** self._periods  # as often as those of the finest level
         layout = (self.occupied, self.start, self.order, self.points, self.soil_of_point, self.soils)
         nodes = (levels.nodes, levels.next_row, levels.of_row)
         wall = (self.fixed, self.contact_of_node, self.normal, self.active)
@@ -494,7 +499,7 @@ class Solver:
         )  # fmt: skip
         self.over_elements(
             self._advance_points, *layout, density, levels.rows, self.geometry, self.nodes, self.tied_means,
-            levels.of_element, dt_of_level, np.exp(-numerics.pic_rate * dt_of_level), numerics.pressure_filter,
+            levels.of_element, dt_of_level, np.exp(-numerics.pic_rate * dt_of_level), filtered,
             per_range=(self.momenta,), up_to=finished,
         )  # fmt: skip
         self.over_nodes(

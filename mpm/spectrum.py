@@ -23,6 +23,7 @@ import numpy as np
 
 from mpm.contact import FIXED_X, FIXED_Y, free_pair
 from mpm.jit import kernel
+from mpm.transfer import spread_volume
 from mpm.variables import MASS, S_DRAG, S_G, S_LAMBDA, S_RHO_S, S_SIN_DIL, N, X, Y
 
 SAFETY = 0.9  # Ritz values come from below, and points move until the next estimate
@@ -31,9 +32,10 @@ KRYLOV = 10  # vectors: from a wrong mode within 0.4 % of the step that many mor
 ROUNDS = 3  # of the step that the drag depends on, from below, at the first call
 
 # What an element sums over its points: volume, the share that takes its own rates, moduli and water's stiffness times
-# volume, and the upper triangles of the consistent masses of grains and of water, row by row.
-(E_V, E_OWN, E_LAMBDA, E_G, E_QS, E_QL) = range(6)
-E_GRAINS, E_WATER, ELEMENT_WIDTH = 6, 12, 18
+# volume, its volume as spread over what is around over its own, and the upper triangles of the consistent masses of
+# grains and of water, row by row.
+(E_V, E_OWN, E_LAMBDA, E_G, E_QS, E_QL, E_SPREAD) = range(7)
+E_GRAINS, E_WATER, ELEMENT_WIDTH = 7, 13, 19
 
 
 @kernel
@@ -45,7 +47,7 @@ def sum_points(
 
     stiffened : (n_elements,) float64
         Factor of the stiffness of an element.
-    held : (n_occupied, 18) float64
+    held : (n_occupied, 19) float64
         Written: see the columns `E_`.
     nodal : (n_nodes, 4) float64
         Added: masses of grains, of water as if it filled all, of pore water [kg/m]; drag [kg/m/s].
@@ -89,12 +91,30 @@ def sum_points(
 
 
 @kernel
+def spread_elements(occupied, rows, geometry, fill, held, row_spread):
+    """Spread the volumes of the elements as the step does (:func:`mpm.transfer.spread_volume`); sums them at the rows.
+
+    fill, row_spread : (n_rows,) float64
+        Volume over area of the elements around a row; added: spread volumes [m2].
+    """
+    for k in range(occupied.size):
+        e = occupied[k]
+        a, b, c = rows[e, 0], rows[e, 1], rows[e, 2]
+        spread = spread_volume(held[k, E_V], geometry[e, 6], fill[a], fill[b], fill[c])
+        held[k, E_SPREAD] = spread / held[k, E_V]
+        row_spread[a] += spread
+        row_spread[b] += spread
+        row_spread[c] += spread
+
+
+@kernel
 def sum_divergences(occupied, elements, rows, geometry, held, velocity, divergence):
-    """Add the divergences of both phases, times the volume in an element, to its rows: (n_rows, 2) float64."""
+    """Add the divergences of the grains and of the water relative to them, times volumes, to rows: (n_rows, 2)."""
     wet = velocity.shape[1] == 4
     for k in range(occupied.size):
         e = occupied[k]
         a, b, c = elements[e, 0], elements[e, 1], elements[e, 2]
+        before, weight = 0.0, held[k, E_V]
         for phase in range(2 if wet else 1):
             x, y = 2 * phase, 2 * phase + 1
             rate = geometry[e, 0] * (velocity[b, x] - velocity[a, x]) + geometry[e, 2] * (
@@ -104,7 +124,8 @@ def sum_divergences(occupied, elements, rows, geometry, held, velocity, divergen
                 velocity[c, y] - velocity[a, y]
             )
             for corner in range(3):
-                divergence[rows[e, corner], phase] += held[k, E_V] * rate
+                divergence[rows[e, corner], phase] += weight * (rate - before)
+            before, weight = rate, held[k, E_V] * held[k, E_SPREAD]
 
 
 @kernel
@@ -112,7 +133,7 @@ def sum_forces(occupied, elements, rows, geometry, held, velocity, smoothing, di
     """Add the forces of the stresses that `velocity` builds in a second to the nodes.
 
     divergence : (n_rows, 2) float64
-        Means at the rows; used where `smoothing`.
+        Means at the rows, of the grains and of the water relative to them; used where `smoothing`.
     force : (n_nodes, 4) float64
         Of the mixture, and of the pore pressure on the water.
     """
@@ -134,13 +155,15 @@ def sum_forces(occupied, elements, rows, geometry, held, velocity, smoothing, di
         if smoothing:
             r, s, t = rows[e, 0], rows[e, 1], rows[e, 2]
             volume = third * (divergence[r, 0] + divergence[s, 0] + divergence[t, 0])
-            liquid = third * (divergence[r, 1] + divergence[s, 1] + divergence[t, 1])
+            liquid = volume + third * (divergence[r, 1] + divergence[s, 1] + divergence[t, 1])
         skeleton = volume + held[k, E_OWN] * (own - volume)
         correction = 0.5 * (skeleton - own)
         pressure = -(held[k, E_QS] * volume + held[k, E_QL] * liquid) if wet else 0.0
         sxx = held[k, E_LAMBDA] * skeleton + 2.0 * held[k, E_G] * (xx + correction) - pressure
         syy = held[k, E_LAMBDA] * skeleton + 2.0 * held[k, E_G] * (yy + correction) - pressure
         sxy = 2.0 * held[k, E_G] * xy
+        if smoothing:
+            pressure *= held[k, E_SPREAD]
         for corner in range(3):
             if corner == 0:
                 i, gx, gy = a, -g1x - g2x, -g1y - g2y
@@ -220,7 +243,14 @@ class Spectrum:
             solver._water_density, solver._water_modulus, mesh.elements, levels.rows, solver.geometry,
             4.0**levels.of_element * (1 + 2 * ahead), self.held, self.nodal, row_volume,
         )  # fmt: skip
-        self.per_volume = np.divide(1.0, row_volume, out=np.zeros_like(row_volume), where=row_volume > 0)[:, None]
+        row_spread = np.zeros_like(row_volume)
+        row_area = np.bincount(
+            levels.rows[occupied].ravel(), np.repeat(solver.geometry[occupied, 6], 3), len(row_volume)
+        )
+        fill = np.divide(row_volume, row_area, out=np.zeros_like(row_volume), where=row_area > 0)
+        spread_elements(occupied, levels.rows, solver.geometry, fill, self.held, row_spread)
+        volumes = np.column_stack([row_volume, row_spread])
+        self.per_volume = np.divide(1.0, volumes, out=np.zeros_like(volumes), where=volumes > 0)
         fixed = solver.fixed[:, None] & np.array([FIXED_X, FIXED_Y], np.int8)
         self.free = (self.nodal[:, :1] > 0) & (fixed == 0)
 

@@ -97,6 +97,17 @@ def on_element(n0, n1, n2):
     return n0 / total, n1 / total, n2 / total
 
 
+@inline_kernel
+def spread_volume(volume, area, fill0, fill1, fill2):
+    """Volume of an element with what its points have too much or too little of it shared with those around [m2].
+
+    How many points an element holds is chance. Where they fill the elements around all nodes, the mean of what nodes
+    hold is the better measure: else water would flow from elements with many points to those with few, and be lost.
+    """
+    inside = min(fill0, fill1, fill2, 1.0)
+    return (1.0 - inside) * volume + inside * area * (fill0 + fill1 + fill2) / 3.0
+
+
 @cache
 def advance_kernel(wet, tied):
     """Kernel `advance_points` for points with pore water or without, on levels tied to each other or on one."""
@@ -104,13 +115,14 @@ def advance_kernel(wet, tied):
     @kernel
     def advance_points(
         first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, rows, geometry, nodes,
-        mean, level_of_element, dt_of_level, flip_of_level, pressure_filter, sums,
+        mean, level_of_element, dt_of_level, flip_of_level, filter_of_level, sums,
     ):  # fmt: skip
         """Advance point velocities and positions from the nodes and map the new momenta back (MUSL).
 
         Velocities take `flip_of_level` of the FLIP and the rest of the PIC update; positions move with
-        the solid. A positive pore pressure is drawn by `pressure_filter` towards its projection on
-        continuous linear functions: what such a function can represent is left as it is.
+        the solid. A pore pressure is drawn by `filter_of_level` towards its projection on continuous
+        linear functions: what such a function can represent is left as it is. Where water is missing
+        the pressure that acts, zero, is drawn just so: what wet points lose fills dry ones.
 
         mean : (n_rows - n_nodes, 6) float64
             Of rows tied to a finer one: mean velocities over the steps of their node, of :mod:`mpm.contact`.
@@ -123,7 +135,7 @@ def advance_kernel(wet, tied):
         for k in range(first, last):
             e = index(occupied[k])
             dt = dt_of_level[level_of_element[e]]
-            flip_fraction = flip_of_level[level_of_element[e]]
+            flip_fraction, pressure_filter = flip_of_level[level_of_element[e]], filter_of_level[level_of_element[e]]
             g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
             x0, y0 = geometry[e, 4], geometry[e, 5]
             a, b, c = index(rows[e, 0]), index(rows[e, 1]), index(rows[e, 2])
@@ -163,7 +175,7 @@ def advance_kernel(wet, tied):
                     uy = points[i, VLY] + n0 * nodes[a, V_DLY] + n1 * nodes[b, V_DLY] + n2 * nodes[c, V_DLY]
                     ux = flip_fraction * ux + pic * hx
                     uy = flip_fraction * uy + pic * hy
-                    smooth = max(n0 * nodes[a, V_P] + n1 * nodes[b, V_P] + n2 * nodes[c, V_P], 0.0)
+                    smooth = n0 * nodes[a, V_P] + n1 * nodes[b, V_P] + n2 * nodes[c, V_P]
                     # the terms of each node in the order of its sums, so that they become vectors
                     sx0 += n0 * (m * vx)
                     sy0 += n0 * (m * vy)
@@ -178,8 +190,7 @@ def advance_kernel(wet, tied):
                     lx2 += n2 * (w * ux)
                     ly2 += n2 * (w * uy)
                     points[i, VSX], points[i, VSY], points[i, VLX], points[i, VLY] = vx, vy, ux, uy
-                    if points[i, P] > 0.0:
-                        points[i, P] += pressure_filter * (smooth - points[i, P])
+                    points[i, P] += pressure_filter * (smooth - max(points[i, P], 0.0))
                 else:
                     sx0 += n0 * (m * vx)
                     sy0 += n0 * (m * vy)
@@ -217,13 +228,16 @@ def rates_kernel(wet):
     """Kernel `element_rates` for points with pore water or without."""
 
     @kernel
-    def element_rates(first, last, occupied, rows, geometry, nodes, volume, rates, sums):
+    def element_rates(first, last, occupied, rows, geometry, nodes, volume, fill, rates, sums):
         """Strain rates, spin and divergences of the remapped velocities, constant in an element [1/s].
 
         volume : (n_elements, 2) float64, of `update_points`.
-        sums : (n_rows, 7) float64
+        fill : (n_rows,) float64
+            Volume over area of the elements with points around a row, of :func:`mpm.contact.smooth_rates`.
+        sums : (n_rows, 9) float64
             Added: volume and volume times the divergence of the grains; volume under pore pressure, and
-            this times both divergences and times the gradient of the projected pore pressure.
+            this times the divergence of the grains, as spread (`spread_volume`) times that of the water relative to
+            them, and times the gradient of the projected pore pressure; that volume as spread; area.
         """
         for k in range(first, last):
             e = index(occupied[k])
@@ -238,23 +252,29 @@ def rates_kernel(wet):
             rates[e, R_XX], rates[e, R_YY], rates[e, R_XY], rates[e, R_W] = xx, yy, 0.5 * (xy + yx), 0.5 * (yx - xy)
             rates[e, R_DS] = xx + yy
             v = volume[e, 0]
+            area = geometry[e, 6] if v > 0.0 else 0.0
             for d in (a, b, c):
                 sums[d, 0] += v
                 sums[d, 1] += v * rates[e, R_DS]
+                sums[d, 8] += area
             if wet:
                 rates[e, R_DL] = (
                     g1x * (nodes[b, V_LX] - nodes[a, V_LX]) + g2x * (nodes[c, V_LX] - nodes[a, V_LX])
                     + g1y * (nodes[b, V_LY] - nodes[a, V_LY]) + g2y * (nodes[c, V_LY] - nodes[a, V_LY])
                 )  # fmt: skip
                 pressed = volume[e, 1]
+                spread = pressed
+                if v > 0.0:
+                    spread *= spread_volume(v, geometry[e, 6], fill[a], fill[b], fill[c]) / v
                 p1, p2 = nodes[b, V_P] - nodes[a, V_P], nodes[c, V_P] - nodes[a, V_P]
                 px, py = pressed * (g1x * p1 + g2x * p2), pressed * (g1y * p1 + g2y * p2)
                 for d in (a, b, c):
                     sums[d, 2] += pressed
                     sums[d, 3] += pressed * rates[e, R_DS]
-                    sums[d, 4] += pressed * rates[e, R_DL]
+                    sums[d, 4] += spread * (rates[e, R_DL] - rates[e, R_DS])
                     sums[d, 5] += px
                     sums[d, 6] += py
+                    sums[d, 7] += spread
 
     return element_rates
 
@@ -270,8 +290,8 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
     @kernel
     def update_points(
         first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, bulk_liquid, rows,
-        geometry, nodes, rates, volume, level_of_element, dt_of_level, ahead, advance, wave_speed, element_of_point,
-        clamps, sums, left,
+        geometry, nodes, rates, volume, fill, level_of_element, dt_of_level, ahead, advance, wave_speed,
+        element_of_point, clamps, sums, left,
     ):  # fmt: skip
         """Advance stress, pore pressure and porosity of the points of a range of elements, and map them to the nodes.
 
@@ -291,6 +311,8 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
         volume : (n_elements, 2) float64
             Material volume, and that of points under pore pressure [m2]; read of the last and written for the
             next step.
+        fill : (n_rows,) float64
+            Volume over area of the elements with points around a row.
         ahead : (n_elements,) float64
             How far the stress that acts on the nodes runs ahead of that of the points, in steps of the element.
         element_of_point : (n_points,) int32
@@ -366,10 +388,9 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
                     es = own_s
                     if wet and p > 0.0:
                         es = wet_s
-                    if loose and p <= 0.0 and not full:
-                        # lumps with air between them: shape changes, neither grains nor water are squeezed
+                    if loose and p <= 0.0 and (own_s > 0.0 or not full):
+                        # lumps with air between them: shape changes, neither grains nor water are stretched or squeezed
                         points[i, SXX] = points[i, SYY] = points[i, SZZ] = points[i, SXY] = 0.0
-                        points[i, P] = 0.0
                         n_suspended += 1
                     else:
                         if wet:
@@ -382,15 +403,14 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
                                 n_cavitated += 1
                         # looser than in the ground, grains close up by what moves them; else with the skeleton's strain
                         change = es if n > soils[s, S_N0] else dvol
-                        if not (loose and p <= 0.0 and change > 0.0):
-                            n = 1.0 - (1.0 - n) / (1.0 + change)
-                            if n < POROSITY_FLOOR:
-                                n = POROSITY_FLOOR
-                                n_floor += 1
-                            elif n > POROSITY_CEILING:
-                                n = POROSITY_CEILING
-                                n_ceiling += 1
-                            points[i, N] = n
+                        n = 1.0 - (1.0 - n) / (1.0 + change)
+                        if n < POROSITY_FLOOR:
+                            n = POROSITY_FLOOR
+                            n_floor += 1
+                        elif n > POROSITY_CEILING:
+                            n = POROSITY_CEILING
+                            n_ceiling += 1
+                        points[i, N] = n
                         if n >= soils[s, S_LOOSE]:
                             points[i, SXX] = points[i, SYY] = points[i, SZZ] = points[i, SXY] = 0.0
                             n_suspended += 1
@@ -497,6 +517,8 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
                 limit_speed = fastest
             g0x, g0y = -g1x - g2x, -g1y - g2y
             if wet:
+                if smoothing and total > 0.0:
+                    fp *= spread_volume(total, geometry[e, 6], fill[i0], fill[i1], fill[i2]) / total
                 # the smallest of the element's nodal shares of volume: a node that hardly touches it is not overdrawn
                 share = 3.0 * min(ml0, ml1, ml2) / (density_liquid * total) if total > 0.0 else 0.0
                 damped = PROJECTION_SMOOTHING * geometry[e, 7] ** 2 * share * pressed

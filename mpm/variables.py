@@ -35,7 +35,7 @@ BUFFER_WIDTH = 13
 # the mean gradient of the pressure projection.
 (V_MS, V_ML, V_SX, V_SY, V_LX, V_LY, V_DSX, V_DSY, V_DLX, V_DLY, V_P, V_TS, V_WS, V_WL, V_GX, V_GY) = range(16)
 NODE_WIDTH = 16
-NODAL_MEANS = 7  # what `element_rates` sums at a node
+NODAL_MEANS = 9  # what `element_rates` sums at a node
 NODAL_MOMENTA = 4  # what `advance_points` sums at a node
 
 # Element rates: strain rates, spin, divergence of both phases.
