@@ -4,8 +4,9 @@
 
 Writes its part of docs/robustness.md and docs/robustness.json. Every run is the command `gush run` in a process of its
 own that ends by SIGKILL at a moment drawn evenly over the life of the uninterrupted one: meshing, relaxation, stepping,
-writing, checkpoints, closing. Processes are forked from one that has compiled the kernels, so that a run takes a second
-and the kill falls into the run and not into its start.
+writing, checkpoints, closing. Moments are measured in processor time of the run itself, which a busy machine does not
+stretch, and a kill counts only if the run's file does not say "finished" yet; others are drawn again. Processes are
+forked from one that has compiled the kernels, so that the kill falls into the run and not into its start.
 """
 
 import argparse
@@ -22,6 +23,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "benchmarks")]
 KILLED_AGAIN = 0.25  # share of the resumed runs that are killed once more
+FINISHED = "finished"
+PEEK = os.WEXITED | os.WNOHANG | os.WNOWAIT  # look for the end of a process without taking its exit code
 
 
 def main():
@@ -51,12 +54,8 @@ def kill_and_resume(place, kills, draw):
     command = ["run", "--no-figures", "--quiet", "--threads", "1", "--checkpoint-interval", "0"]
     # twice: the first run compiles
     run_here([*command, str(scene), "--out", str(place / "compiled")])
-    begin = time.time()
-    code = ended(forked([*command, str(scene), "--out", str(place / "whole")]), None)
-    assert code == 0, "the uninterrupted run must succeed"
-    # until the last line of its log; what follows only reads
-    life = (place / "whole" / "run.log").stat().st_mtime - begin
-    struck, different, codes, found = 0, [], Counter(), Counter()
+    life = life_of(forked([*command, str(scene), "--out", str(place / "whole")]), place / "whole")
+    struck, late, different, codes, found = 0, 0, [], Counter(), Counter()
     begin = time.monotonic()
     while struck < kills:
         folder = place / "killed"
@@ -64,8 +63,12 @@ def kill_and_resume(place, kills, draw):
         start, again = [*command, str(scene), "--out", str(folder)], [*command, "--resume", "--out", str(folder)]
         code = ended(forked(start), draw.uniform(0.0, life))
         while code == -signal.SIGKILL:
-            struck += 1
-            found[state_of(folder)] += 1
+            state = state_of(folder)
+            if state == FINISHED:
+                late += 1
+            else:
+                struck += 1
+                found[state] += 1
             # a run killed before it had written its scene has nothing to resume
             if not (folder / "scene.toml").exists():
                 again = [*start, "--overwrite"]
@@ -77,8 +80,26 @@ def kill_and_resume(place, kills, draw):
             different.append(str(comparison["differences"]))
     return {
         "kills": struck, "runs": sum(codes.values()), "identical": sum(codes.values()) - len(different),
-        "different": different, "found": dict(found), "life_seconds": life, "seconds": time.monotonic() - begin,
+        "different": different, "found": dict(found), "late": late, "life_seconds": life,
+        "seconds": time.monotonic() - begin,
     }  # fmt: skip
+
+
+def life_of(child, folder):
+    """Processor time that an uninterrupted run takes until its file says "finished" [s]; waits for its end."""
+    used = 0.0
+    while state_of(folder) != FINISHED:
+        used = processor_time(child)
+        time.sleep(0.02)
+    assert ended(child, None) == 0, "the uninterrupted run must succeed"
+    return used
+
+
+def processor_time(child):
+    """Processor time that a process has taken [s]; it may have ended, but must not have been waited for."""
+    # proc(5): utime and stime are fields 14 and 15; the name before them may hold spaces
+    fields = Path(f"/proc/{child}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def state_of(folder):
@@ -92,8 +113,8 @@ def state_of(folder):
         status = read_attributes(folder)["status"]
     except RunFileError:
         return "scene, no records yet"
-    if status == "finished":
-        return "finished"
+    if status == FINISHED:
+        return FINISHED
     kept = len(list(folder.glob("checkpoint-*.h5")))
     return f"{'records' if records else 'no records'}, {kept} checkpoint{'s' * (kept != 1)}"
 
@@ -117,10 +138,12 @@ def run_here(arguments):
     return 0
 
 
-def ended(child, seconds):
-    """Exit code of a process; minus the signal where it was killed after that time."""
-    if seconds is not None:
-        time.sleep(seconds)
+def ended(child, moment):
+    """Exit code of a process; minus the signal where it was killed once it had taken that much processor time [s]."""
+    if moment is not None:
+        # one thread takes no more processor time than passes on the clock
+        while (left := moment - processor_time(child)) > 0 and os.waitid(os.P_PID, child, PEEK) is None:
+            time.sleep(max(left, 0.001))
         os.kill(child, signal.SIGKILL)
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 

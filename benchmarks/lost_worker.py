@@ -2,13 +2,15 @@
 
     uv run python benchmarks/lost_worker.py           # 64 coarse runs; fewer, from 4 on, as an argument
 
-The study must end complete and equal to the serial one, bit for bit. Prints what happened as JSON.
+The study must end complete and equal to the serial one, bit for bit. Prints what happened as JSON and writes its part
+of docs/robustness.md and docs/robustness.json.
 """
 
 import argparse
 import json
 import os
 import signal
+import sys
 import tempfile
 import time as clock
 from pathlib import Path
@@ -17,6 +19,8 @@ import numpy as np
 
 import coupling
 from coupling.scene import load_scene
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 COARSE = {
     "element_size": 5.0,
@@ -50,7 +54,7 @@ def plan(count):
 
 
 def killed_study(count, folder):
-    """Run the study on a scheduler, kill a worker after a quarter of the cases; dataset, lines told, pid killed."""
+    """Run the study on a scheduler, kill a worker in the middle; dataset, lines told, pid killed."""
     import dask
     from distributed import Client, LocalCluster
 
@@ -65,7 +69,7 @@ def killed_study(count, folder):
 
         def progress(line):
             lines.append(line)
-            if " done" in line and len(lines) > max(count // 4, 1) and not killed:
+            if " done" in line and len(lines) > count // 2 and not killed:
                 worker = next(iter(client.run(os.getpid).values()))
                 os.kill(worker, signal.SIGKILL)
                 killed.append(worker)
@@ -98,6 +102,9 @@ def main():
         "parallel_seconds": between - begin,
         "serial_seconds": end - between,
     }
+    from robustness_page import write_part
+
+    write_part("lost_worker", result)
     print(json.dumps(result, indent=1))
     raise SystemExit(0 if not different and result["finished"] == count and killed else 1)
 

@@ -1,4 +1,4 @@
-"""The page docs/robustness.md, put together from what benchmarks/fuzz.py and benchmarks/kills.py measured."""
+"""The page docs/robustness.md, put together from what fuzz.py, kills.py and lost_worker.py measured."""
 
 import json
 import os
@@ -28,11 +28,11 @@ def write_part(name, result):
 def page(parts):
     """Text of the page."""
     lines = [
-        "# Bad input, damaged files, kills",
+        "# Bad input, damaged files, kills, lost workers",
         "",
         "Written by the commands named below from their own measurements; the numbers are in robustness.json.",
     ]
-    for name, write in (("scenes", _scenes), ("files", _files), ("kills", _kills)):
+    for name, write in (("scenes", _scenes), ("files", _files), ("kills", _kills), ("lost_worker", _lost_worker)):
         if name in parts:
             lines += ["", *write(parts[name])]
     return "\n".join(lines) + "\n"
@@ -80,8 +80,8 @@ def _files(part):
         "|---|" + "---|" * len(kinds),
         *rows,
         "",
-        f"Faults (a traceback, a crash, more than {part['patience']:g} s, other values than the whole file's without "
-        f"a word, a file changed by a command that refused it): {len(part['faults'])}. Together "
+        f"Faults (a traceback, a crash, more than {part['patience']:g} s of processor time, other values than the "
+        f"whole file's without a word, a file changed by a command that refused it): {len(part['faults'])}. Together "
         f"{part['seconds']:.0f} s.",
         *_faults(part["faults"]),
         *_where(part),
@@ -93,17 +93,34 @@ def _kills(part):
     return [
         "## Kills",
         "",
-        f"`uv run python benchmarks/kills.py --kills {part['kills']} --seed {part['seed']}`. A small run of "
-        f"{part['life_seconds']:.1f} s is ended by SIGKILL at a moment drawn evenly over its life, and resumed; every "
-        "fourth resumed one is killed again. What the kills left behind:",
+        f"`uv run python benchmarks/kills.py --kills {part['kills']} --seed {part['seed']}`. A small run that takes "
+        f"{part['life_seconds']:.1f} s of processor time is ended by SIGKILL at a moment drawn evenly over that time, "
+        "and resumed; every fourth resumed one is killed again. What the kills left behind:",
         "",
         "| state | kills |",
         "|---|---|",
         *rows,
         "",
+        f'All of them struck before the run\'s file said "finished"; {part["late"]} more came later and do not count. '
         f"{part['kills']} kills in {part['runs']} runs; {part['identical']} of {part['runs']} runs ended with the bits "
         f"of the uninterrupted run, in {part['seconds']:.0f} s.",
         *_faults(part["different"]),
+        *_where(part),
+    ]
+
+
+def _lost_worker(part):
+    different = part["different_variables"]
+    return [
+        "## A lost worker",
+        "",
+        f"`uv run python benchmarks/lost_worker.py {part['runs']}`. A study of {part['runs']} coarse runs on a dask "
+        f"scheduler with two worker processes, of which {part['workers_killed']} was killed in the middle, against the "
+        "same study in one process.",
+        "",
+        f"{part['finished']} of {part['runs']} runs finished; variables of the study's dataset that differ from the "
+        f"serial one in any bit: {len(different)}{''.join(f', {name}' for name in different)}. "
+        f"{part['parallel_seconds']:.0f} s with the workers, {part['serial_seconds']:.0f} s in one process.",
         *_where(part),
     ]
 

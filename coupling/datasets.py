@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from coupling.journal import changed, put_in_place, readable, recover, replace_file
+from coupling.netcdf_group import read_group_at_once
 from coupling.own_content import ForeignContent, require_own_content
 from coupling.provenance import with_history
 from mpm.variables import CLAMPS, POINT_VARIABLES
@@ -557,25 +558,21 @@ def read_group(path, group, row=None):
 
 
 def _read(file, group, row=None):
-    import xarray as xr
+    def complete(time):
+        # a batch cut short by a kill has no time yet: it was written last
+        rows = np.flatnonzero(np.isfinite(time))
+        if row is None:
+            return rows
+        if not len(rows):
+            raise RunFileError(f"run file '{file}': group '{group}' has no complete record yet")
+        return int(rows[row])
 
     try:
-        with (
-            _shown(file) as shown,
-            xr.open_dataset(shown, group=group, engine="h5netcdf", decode_times=False) as dataset,
-        ):
-            if "time" in dataset.coords:
-                # a batch cut short by a kill has no time yet: it was written last
-                complete = np.isfinite(np.atleast_1d(dataset["time"].values))
-                if not complete.all():
-                    dataset = dataset.isel(time=np.flatnonzero(complete))
-                if row is not None:
-                    if not dataset.sizes["time"]:
-                        raise RunFileError(f"run file '{file}': group '{group}' has no complete record yet")
-                    dataset = dataset.isel(time=row)
-            if "scene_sha256" in dataset.attrs:
-                _check_scene(file, dataset.attrs)
-            return dataset.load()
+        with _shown(file) as shown:
+            dataset = read_group_at_once(shown, group, complete)
+        if "scene_sha256" in dataset.attrs:
+            _check_scene(file, dataset.attrs)
+        return dataset
     except RunFileError:
         raise
     except Exception as error:

@@ -7,6 +7,7 @@ from pathlib import Path
 from coupling.datasets import RunFileError
 from coupling.own_content import require_own_content
 from coupling.run_folder import RUN_FILE, RunRefused
+from coupling.studies.execute import STUDY_FILE
 
 SIGNATURES = {b"\x89HDF\r\n\x1a\n": "netcdf", b"\x89PNG\r\n\x1a\n": "png", b"GIF8": "gif", b"CDF": "netcdf3"}
 
@@ -27,8 +28,8 @@ def describe(path):
     ------
     RunRefused
         Nothing is there.
-    RunFileError
-        A netCDF file that cannot be read.
+    RunFileError, coupling.studies.design.StudyError
+        A netCDF file or a study that cannot be read.
     """
     path = Path(path)
     if not path.exists():
@@ -44,10 +45,29 @@ def _folder(path):
         others = sorted(entry.name for entry in path.iterdir() if entry.name not in (RUN_FILE, ".lock"))
         return {"kind": "run folder", "facts": facts | {"beside run.nc": ", ".join(others) or "nothing"},
                 "next": _run_commands(path)}  # fmt: skip
+    if (path / STUDY_FILE).is_file():
+        return _study(path)
     runs = sorted(entry.parent.name for entry in path.glob(f"*/{RUN_FILE}"))
     if runs:
         return {"kind": "folder of runs", "facts": {"runs": ", ".join(runs)}, "next": [f"gush info {path / runs[0]}"]}
     return {"kind": "folder without a run", "facts": {"entries": sum(1 for _ in path.iterdir())}}
+
+
+def _study(path):
+    from coupling.studies.collect import stored_cases
+    from coupling.studies.execute import case_file
+
+    plan, cases, failures = stored_cases(path)
+    facts = {
+        "name": plan.name,
+        "scene": plan.scene,
+        "parameters": ", ".join(plan.parameters),
+        "cases": len(cases),
+        "finished": sum(case_file(path, case).is_file() for case in cases),
+        "failed": len(failures),
+        "lining models": ", ".join(plan.backends),
+    }
+    return {"kind": "study folder", "facts": facts, "next": [f"gush report {path}"]}
 
 
 def _file(path):
@@ -59,7 +79,7 @@ def _file(path):
     if kind in ("png", "gif"):
         return {"kind": f"picture ({kind.upper()})"}
     if b"gushing report" in start:
-        return {"kind": "report of a run", "next": ["open it in a browser"]}
+        return {"kind": "report of a run or a study", "next": ["open it in a browser"]}
     if b"<VTKFile" in start or b"<Xdmf" in start:
         return {"kind": "mesh or fields for ParaView", "next": ["open it in ParaView"]}
     if path.suffix == ".toml":

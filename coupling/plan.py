@@ -152,8 +152,8 @@ def features(scene, threads):
         ),
         (
             "two velocities, of grains and water",
-            s.water is not None,
-            "also where they hardly differ: drag is implicit, no permeability limits the step" if s.water else "dry",
+            s.is_two_phase,
+            _velocities(s),
         ),
         (
             "Mohr-Coulomb return mapping",
@@ -171,6 +171,13 @@ def features(scene, threads):
             "volumetric smoothing",
             numerics.volumetric_smoothing,
             "against locking of linear triangles" if numerics.volumetric_smoothing else "switched off in [numerics]",
+        ),
+        (
+            "velocities mapped anew for the strains",
+            numerics.remapping,
+            "MUSL: a node that a point hardly touches does not strain"
+            if numerics.remapping
+            else "remapping = false in [numerics] (USL): a shorter critical step",
         ),
         (
             "pressure filter",
@@ -192,6 +199,12 @@ def features(scene, threads):
         ),
     )
     return [{"feature": name, "active": bool(active), "reason": reason} for name, active, reason in table]
+
+
+def _velocities(s):
+    if s.is_undrained:
+        return "drainage = 'undrained': water moves with the grains, no drag, no conductivity"
+    return "also where they hardly differ: drag is implicit, no permeability limits the step" if s.water else "dry"
 
 
 def _frictionless(s):

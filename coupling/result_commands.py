@@ -13,21 +13,28 @@ Run = Annotated[Path, typer.Argument(help="Folder (or run.nc) of a run, also one
 
 
 def report_command(
-    run: Run,
-    out: Annotated[Path | None, typer.Option(help="The HTML file; report.html in the run's folder when left out.")] = (
-        None
-    ),
+    path: Annotated[Path, typer.Argument(help="Folder of a run (or its run.nc) or of a study, also one that goes on.")],
+    out: Annotated[Path | None, typer.Option(help="The HTML file; report.html in the folder when left out.")] = None,
+    runs: Annotated[bool, typer.Option("--runs", help="Of a study: also write the page of every run.")] = False,
     json_path: JsonPath = None,
 ):
-    """Write one HTML page about a run: key numbers, player over time, balances, scene. Opens without a network.
+    """Write one HTML page about a run or a study: key numbers, charts with one slider, balances. Opens offline.
 
-    JSON: `run`, `report` (path), `bytes`.
+    JSON: `run` or `study` (path), `report` (path), `bytes`; `runs` (paths) with --runs.
     """
     with failures(), checked_json(json_path):
-        from coupling.report.page import write_report
+        from coupling.report.page import study_folder, write_report, write_run_reports
+        from coupling.run_folder import RunRefused
 
-        path = write_report(run, out)
-        _tell({"run": str(run), "report": str(path), "bytes": path.stat().st_size}, json_path, [path])
+        folder = study_folder(path)
+        if runs and folder is None:
+            raise RunRefused(f"--runs: '{path}' must be a study, it is a run; leave --runs out")
+        of_runs = write_run_reports(folder) if runs else []
+        page = write_report(path, out)
+        data = {"run" if folder is None else "study": str(path), "report": str(page), "bytes": page.stat().st_size}
+        if runs:
+            data["runs"] = [str(file) for file in of_runs]
+        _tell(data, json_path, [*of_runs, page])
 
 
 def export_command(

@@ -110,8 +110,8 @@ def solve_nodes(
         What the parts of the mesh add to the rows; added in the order of the parts. Written: momenta of rows tied to
         a finer one, which follow the node.
     mean : (n_rows - n_nodes, 6) float64
-        Of rows tied to a finer one: mean over their step so far of the velocity of the grains, and of the remapped
-        velocities of both phases.
+        Of rows tied to a finer one: mean over their step so far of the velocity of the grains, and of the
+        velocities of both phases that strain (remapped or not).
     fixed, status : (n_nodes,) int8
         Bits of box boundary and mirror line; written: which constraints acted.
     contact_of_node : (n_nodes,) int32
@@ -371,9 +371,126 @@ def solve_dry_nodes(
     ledger[7] += reactions
 
 
+@kernel_part
+def solve_undrained_nodes(
+    first, last, which, next_row, level_of_row, begun, dt_of_level, sums, mean, gravity, density_liquid, fixed,
+    contact_of_node, normal, active, friction, wall, nodes, status, impulse, ledger,
+):  # fmt: skip
+    """`solve_nodes` for water that moves with the grains: the limit of infinite drag, one momentum equation a node.
+
+    A wall pushes the mixture or lets it go. Of its push the water bears what holds its own momentum, M_l v + dt F_l,
+    but no more than all and no tension; grains bear the rest, which limits friction. `nodes` columns of the water's
+    velocity are not touched; V_MS is the mass of the mixture.
+    """
+    sum_x = sum_y = kinetic = by_gravity = by_stress = unfelt = reactions = 0.0
+    n_nodes = nodes.shape[0] - mean.shape[0]
+    for k in range(first, last):
+        i = which[k]
+        dt = dt_of_level[level_of_row[i]]
+        mass = ml = px = py = fx = fy = flx = fly = 0.0
+        r = i
+        while r >= 0:
+            ml_row = q = 0.0
+            for part in range(sums.shape[0]):
+                mass += sums[part, r, B_MS] + sums[part, r, B_MN]
+                ml_row += sums[part, r, B_ML]
+                px += sums[part, r, B_PSX]
+                py += sums[part, r, B_PSY]
+                q += sums[part, r, B_Q]
+                fx += sums[part, r, B_FX]
+                fy += sums[part, r, B_FY]
+                flx += sums[part, r, B_FLX]
+                fly += sums[part, r, B_FLY]
+            ml += ml_row
+            if ml_row <= 0.0:
+                nodes[r, V_P] = 0.0
+            elif level_of_row[r] <= begun:
+                nodes[r, V_P] += q * density_liquid / ml_row
+            r = next_row[r]
+        if fixed[i] & MIRROR_X:
+            px = 0.0
+        nodes[i, V_MS] = mass
+        status[i] = 0
+        if mass <= 0.0:
+            nodes[i, V_MS] = 0.0
+            stop_rows(i, next_row, nodes, mean)
+            continue
+        ux, uy = px / mass, py / mass
+        px += dt * fx
+        py += dt * (fy - mass * gravity)
+        c = contact_of_node[i]
+        if c >= 0 and active[c]:
+            nx, ny = normal[c, 0], normal[c, 1]
+            pn, pt = nx * px + ny * py, ny * px - nx * py
+            if pn < 0.0:
+                push = -pn / dt
+                water = -(ml * (nx * ux + ny * uy) / dt + nx * flx + ny * (fly - ml * gravity))
+                water = min(max(water, 0.0), push)
+                reaction = push - water
+                shear = -pt / dt
+                limit = friction[c] * reaction
+                status[i] = SOLID_HELD
+                if abs(shear) > limit:
+                    shear = limit if shear > 0.0 else -limit
+                    pt += dt * shear
+                else:
+                    pt = 0.0
+                    status[i] |= SOLID_STICKS
+                impulse[c, 0] += dt * reaction
+                impulse[c, 1] += dt * water
+                impulse[c, 2] += dt * shear
+                impulse[c, 3] += dt * reaction * reaction
+                impulse[c, 4] += dt * water * water
+                unfelt += abs(ny * pt - px - dt * (nx * push + ny * shear))
+                unfelt += abs(-nx * pt - py - dt * (ny * push - nx * shear))
+                reactions += dt * push
+                px, py = ny * pt, -nx * pt
+        vx, vy = px / mass, py / mass
+        if fixed[i] & FIXED_X:
+            vx = 0.0
+        if fixed[i] & FIXED_Y:
+            vy = 0.0
+        nodes[i, V_SX], nodes[i, V_SY] = vx, vy
+        nodes[i, V_DSX], nodes[i, V_DSY] = vx - ux, vy - uy
+        r = next_row[i]
+        while r >= 0:
+            t = r - n_nodes
+            if level_of_row[r] <= begun:
+                for column in range(mean.shape[1]):
+                    mean[t, column] = 0.0
+                nodes[r, V_DSX] = nodes[r, V_DSY] = 0.0
+            share = dt / dt_of_level[level_of_row[r]]
+            mean[t, 0] += share * vx
+            mean[t, 1] += share * vy
+            nodes[r, V_SX], nodes[r, V_SY] = vx, vy
+            nodes[r, V_DSX] += vx - ux
+            nodes[r, V_DSY] += vy - uy
+            for part in range(sums.shape[0]):
+                held = sums[part, r, B_MS] + sums[part, r, B_MN]
+                sums[part, r, B_PSX] += held * (vx - ux)
+                sums[part, r, B_PSY] += held * (vy - uy)
+            r = next_row[r]
+        sx, sy = 0.5 * (ux + vx), 0.5 * (uy + vy)
+        sum_x += mass * (vx - ux)
+        sum_y += mass * (vy - uy)
+        kinetic += mass * (sx * (vx - ux) + sy * (vy - uy))
+        by_gravity -= dt * gravity * mass * sy
+        by_stress += dt * (sx * fx + sy * fy)
+    ledger[0] += sum_x
+    ledger[1] += sum_y
+    ledger[2] += kinetic
+    ledger[3] += by_gravity
+    ledger[5] += by_stress
+    ledger[6] += unfelt
+    ledger[7] += reactions
+
+
 @cache
-def remap_kernel(wet):
-    """Kernel `remap_nodes` for points with pore water or without."""
+def remap_kernel(two_phase, remapping):
+    """Kernel `remap_nodes` for water that has a velocity of its own or not.
+
+    Without `remapping` velocities stay as solved.
+    """
 
     @kernel_part
     def remap_nodes(
@@ -390,61 +507,64 @@ def remap_kernel(wet):
             i = which[k]
             if nodes[i, V_MS] <= 0.0:
                 continue
-            sx = sy = lx = ly = 0.0
-            r = i
-            while r >= 0:
-                done = level_of_row[r] <= finished
-                for part in range(momenta.shape[0]):
-                    if done:
-                        sx += momenta[part, r, 0]
-                        sy += momenta[part, r, 1]
-                        if wet:
-                            lx += momenta[part, r, 2]
-                            ly += momenta[part, r, 3]
+            if remapping:
+                sx = sy = lx = ly = 0.0
+                r = i
+                while r >= 0:
+                    done = level_of_row[r] <= finished
+                    for part in range(momenta.shape[0]):
+                        if done:
+                            sx += momenta[part, r, 0]
+                            sy += momenta[part, r, 1]
+                            if two_phase:
+                                lx += momenta[part, r, 2]
+                                ly += momenta[part, r, 3]
+                        else:
+                            sx += sums[part, r, B_PSX]
+                            sy += sums[part, r, B_PSY]
+                            if two_phase:
+                                lx += sums[part, r, B_PLX]
+                                ly += sums[part, r, B_PLY]
+                    r = next_row[r]
+                sx /= nodes[i, V_MS]
+                sy /= nodes[i, V_MS]
+                if two_phase:
+                    lx /= nodes[i, V_ML]
+                    ly /= nodes[i, V_ML]
+                c = contact_of_node[i]
+                if c >= 0 and active[c]:
+                    nx, ny = normal[c, 0], normal[c, 1]
+                    if wall is not None:
+                        sx -= wall[c, 0]
+                        sy -= wall[c, 1]
+                        lx -= wall[c, 0]
+                        ly -= wall[c, 1]
+                    if status[i] & SOLID_STICKS:
+                        sx = sy = 0.0
                     else:
-                        sx += sums[part, r, B_PSX]
-                        sy += sums[part, r, B_PSY]
-                        if wet:
-                            lx += sums[part, r, B_PLX]
-                            ly += sums[part, r, B_PLY]
-                r = next_row[r]
-            sx /= nodes[i, V_MS]
-            sy /= nodes[i, V_MS]
-            if wet:
-                lx /= nodes[i, V_ML]
-                ly /= nodes[i, V_ML]
-            c = contact_of_node[i]
-            if c >= 0 and active[c]:
-                nx, ny = normal[c, 0], normal[c, 1]
-                if wall is not None:
-                    sx -= wall[c, 0]
-                    sy -= wall[c, 1]
-                    lx -= wall[c, 0]
-                    ly -= wall[c, 1]
-                if status[i] & SOLID_STICKS:
-                    sx = sy = 0.0
-                else:
-                    vn = nx * sx + ny * sy
-                    if status[i] & SOLID_HELD or vn < 0.0:
-                        sx -= vn * nx
-                        sy -= vn * ny
-                if wet:
-                    vn = nx * lx + ny * ly
-                    if status[i] & LIQUID_HELD or vn < 0.0:
-                        lx -= vn * nx
-                        ly -= vn * ny
-                if wall is not None:
-                    sx += wall[c, 0]
-                    sy += wall[c, 1]
-                    lx += wall[c, 0]
-                    ly += wall[c, 1]
-            if fixed[i] & FIXED_X:
-                sx = lx = 0.0
-            if fixed[i] & FIXED_Y:
-                sy = ly = 0.0
-            nodes[i, V_SX], nodes[i, V_SY] = sx, sy
-            if wet:
-                nodes[i, V_LX], nodes[i, V_LY] = lx, ly
+                        vn = nx * sx + ny * sy
+                        if status[i] & SOLID_HELD or vn < 0.0:
+                            sx -= vn * nx
+                            sy -= vn * ny
+                    if two_phase:
+                        vn = nx * lx + ny * ly
+                        if status[i] & LIQUID_HELD or vn < 0.0:
+                            lx -= vn * nx
+                            ly -= vn * ny
+                    if wall is not None:
+                        sx += wall[c, 0]
+                        sy += wall[c, 1]
+                        lx += wall[c, 0]
+                        ly += wall[c, 1]
+                if fixed[i] & FIXED_X:
+                    sx = lx = 0.0
+                if fixed[i] & FIXED_Y:
+                    sy = ly = 0.0
+                nodes[i, V_SX], nodes[i, V_SY] = sx, sy
+                if two_phase:
+                    nodes[i, V_LX], nodes[i, V_LY] = lx, ly
+            else:
+                sx, sy, lx, ly = nodes[i, V_SX], nodes[i, V_SY], nodes[i, V_LX], nodes[i, V_LY]
             r = next_row[i]
             while r >= 0:
                 t = r - n_nodes

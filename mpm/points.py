@@ -295,9 +295,9 @@ def update_order(
 
 
 @cache
-def relocate_kernel(wet, tied):
+def relocate_kernel(wet, undrained, tied):
     """Kernel `relocate` for points with pore water or without, on levels tied to each other or on one."""
-    map_point = map_kernel(wet, tied)
+    map_point = map_kernel(wet, undrained, tied)
 
     @kernel_part
     def relocate(

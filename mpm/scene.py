@@ -79,11 +79,23 @@ class Box(Part):
 
 
 class Water(Part):
-    """Pore water; everything below the table is saturated, and so is what hangs above it. A dry scene has none."""
+    """Pore water; everything below the table is saturated, and so is what hangs above it. A dry scene has none.
+
+    Parameters
+    ----------
+    table_depth : float
+        Of the ground water below the surface [m].
+    density, bulk_modulus : float
+        [kg/m3], [Pa]
+    drainage : str
+        "two-phase": water has a velocity of its own, by drag and the conductivity of the soils. "undrained": it moves
+        with the grains, the limit of a conductivity of zero; conductivities are not read.
+    """
 
     table_depth: Length = Field(ge=0)
     density: Density = Field(gt=500, lt=2000)
     bulk_modulus: Pressure = Field(ge=1e6, le=1e11)
+    drainage: Literal["two-phase", "undrained"] = "two-phase"
 
 
 class Soil(Part):
@@ -260,6 +272,10 @@ class Numerics(Part):
         Share of a point's pore pressure that is drawn in each step to a smooth projection [-]; 0 is off.
     volumetric_smoothing : bool
         Mean volumetric strain rates over the elements around a node.
+    remapping : bool
+        Strain rates of nodal velocities that are mapped anew from the advanced points (MUSL, Sulsky, Zhou & Schreyer
+        1995); false: of those just solved, as before it (USL). That saves some percent of a step, but a node that a
+        point hardly touches strains without bound, and the critical step falls with its mass.
     critical_step : str
         Where the critical time step comes from: "altitude" of the elements over the wave speed, or "spectral", the
         largest eigenvalue of the points on their mesh, renewed now and then (`mpm.spectrum`).
@@ -271,10 +287,20 @@ class Numerics(Part):
     pic_rate: Annotated[float, in_unit("1/s")] = Field(default=10.0, ge=0)
     pressure_filter: float = Field(default=0.4, ge=0, le=1)
     volumetric_smoothing: bool = True
+    remapping: bool = True
     critical_step: Literal["altitude", "spectral"] = "spectral"
     local_time_stepping: bool = True
     relaxation_tolerance: float = Field(default=1e-5, gt=0, lt=1)
     max_relaxation_steps: int = Field(default=20000, ge=1, le=10_000_000)
+
+    @model_validator(mode="after")
+    def _check(self):
+        if not self.remapping and self.critical_step == "altitude":
+            raise ValueError(
+                "critical_step: must be 'spectral' where remapping is false, got 'altitude'; altitude over wave speed "
+                "does not see the small masses of nodes that then limit the step"
+            )
+        return self
 
 
 class Stop(Part):
@@ -341,13 +367,20 @@ class Scene(Part):
                 f"soils: top_depth {tops[-1]:g} m must lie in the box of depth {self.box.depth:g} m; leave "
                 "the layer out, or deepen the box"
             )
-        if self.water is not None:
+        if self.is_two_phase:
             unknown = [soil.name for soil in self.soils if soil.hydraulic_conductivity is None]
             if unknown:
                 raise ValueError(
                     f"soil '{unknown[0]}': hydraulic_conductivity must be given where there is water, got none; give "
                     "the Darcy conductivity in m/s, sand about 1e-4, or leave [water] out for a dry scene"
                 )
+        moving = [k for k, tunnel in enumerate(self.tunnels) if self.lining_of(tunnel) != "fixed"]
+        if self.is_undrained and moving:
+            raise ValueError(
+                f"water: drainage = 'undrained' needs linings that are held, got lining = "
+                f"'{self.lining_of(self.tunnels[moving[0]])}' of tunnel {moving[0]}, whose motion is solved with the "
+                "momentum of the water; leave drainage out and give a small hydraulic_conductivity"
+            )
         if self.water is not None and self.water.table_depth >= self.box.depth:
             raise ValueError(
                 f"water: table_depth {self.water.table_depth:g} m must lie in the box of depth {self.box.depth:g} m; "
@@ -420,6 +453,16 @@ class Scene(Part):
         if self.lining_of(self.tunnels[0]) != "fixed":
             return "a lining that moves"
         return None
+
+    @property
+    def is_two_phase(self):
+        """Whether there is water with a velocity of its own."""
+        return self.water is not None and self.water.drainage == "two-phase"
+
+    @property
+    def is_undrained(self):
+        """Whether there is water that moves with the grains."""
+        return self.water is not None and self.water.drainage == "undrained"
 
     @property
     def is_half(self):

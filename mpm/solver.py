@@ -8,7 +8,15 @@ from types import SimpleNamespace
 import numpy as np
 
 from mpm import stages
-from mpm.contact import FIXED_X, FIXED_Y, MIRROR_X, remap_kernel, solve_dry_nodes, solve_nodes
+from mpm.contact import (
+    FIXED_X,
+    FIXED_Y,
+    MIRROR_X,
+    remap_kernel,
+    solve_dry_nodes,
+    solve_nodes,
+    solve_undrained_nodes,
+)
 from mpm.half_model import right_half, ring_factors, whole_ring, with_mirrored_points
 from mpm.levels import element_levels, sorted_by_level, tie
 from mpm.long_step import (
@@ -74,6 +82,7 @@ FEWEST_BETWEEN_SPECTRA, MOST_BETWEEN_SPECTRA, MOST_BETWEEN_SPECTRA_OF_LEVELS = 5
 ALMOST = 1.1  # a step shortened by less to meet an output time counts as limited by what limited it before
 # Of the spectral step over that of the altitude. Beyond, a few points resist nothing where they are: no estimate.
 MOST_OVER_ALTITUDE = 4.0
+LEAST_OVER_ALTITUDE = 1e-3  # without remapping a node that a point hardly touches takes less: the run would stand still
 SMALLEST_PARALLEL = 4000  # elements; below it a second thread costs more than it brings
 
 
@@ -192,14 +201,15 @@ class Solver:
         wet = scene.water is not None
         plastic = any(soil.model == "mohr-coulomb" for soil in scene.soils)
         tied = self.levels.count > 1
+        undrained = scene.is_undrained
         dilatant = plastic and any(soil.dilatancy_angle > 0 for soil in scene.soils if soil.model != "elastic")
         self._long_step = long_step_kernel(
-            solve_nodes if wet else solve_dry_nodes,
-            advance_kernel(wet, tied),
-            remap_kernel(wet),
-            rates_kernel(wet),
-            update_kernel(wet, plastic, scene.numerics.volumetric_smoothing, dilatant, tied),
-            relocate_kernel(wet, tied),
+            solve_undrained_nodes if undrained else solve_nodes if wet else solve_dry_nodes,
+            advance_kernel(wet, undrained, tied, scene.numerics.remapping),
+            remap_kernel(wet and not undrained, scene.numerics.remapping),
+            rates_kernel(wet, undrained),
+            update_kernel(wet, undrained, plastic, scene.numerics.volumetric_smoothing, dilatant, tied),
+            relocate_kernel(wet, undrained, tied),
         )
         self._water_density = scene.water.density if wet else 0.0
         self._water_modulus = scene.water.bulk_modulus if wet else 0.0
@@ -347,6 +357,14 @@ class Solver:
             step, self.mode = spectral_time_step(self, certain, self.mode)
             if step > MOST_OVER_ALTITUDE * shortest / self.wave_speed:
                 step = 0.5 * shortest / self.wave_speed
+            if step < LEAST_OVER_ALTITUDE * shortest / self.wave_speed and not self.scene.numerics.remapping:
+                components = 4 if self.scene.is_two_phase else 2
+                raise RunFailed(
+                    f"the time step fell to {step:.2g} s, which nodes that points hardly touch need without remapping; "
+                    "set remapping = true in [numerics]",
+                    self.time,
+                    self.mesh.nodes[int(np.argmax(np.abs(self.mode))) // components],
+                )
             most = MOST_BETWEEN_SPECTRA if self.levels.count == 1 else MOST_BETWEEN_SPECTRA_OF_LEVELS
             fallen = step < 0.9 * self.longest_step
             self.estimate_interval = FEWEST_BETWEEN_SPECTRA if fallen else min(2 * self.estimate_interval, most)
@@ -707,7 +725,7 @@ def soil_table(scene):
             min(soil.tensile_strength, apex),
             soil.loose_porosity,
             soil.porosity,
-            scene.gravity / soil.hydraulic_conductivity if scene.water is not None else 0.0,
+            scene.gravity / soil.hydraulic_conductivity if scene.is_two_phase else 0.0,
             soil.grain_density,
         )
     return table

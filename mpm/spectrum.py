@@ -9,12 +9,18 @@ The stiffness holds what the kernels hold: mean volume changes, element strains,
 nodes, twice, with the points between (velocities return to the nodes through them, MUSL), which takes the shortest
 waves of consistent-mass kind away. Altitude over wave speed knows none of this.
 
+Without remapping (USL) strains follow the solved velocities u + dt a, only the points take the way S from the nodes to
+the points and back: u' = u + dt S a, x' = x + dt (u + dt a). At z = -1 these are dt^2 (2 - S) k = 4 m: the way is not
+taken off the acceleration, but from twice of it, and what damps waves, (1 - S) dt^2 k / m a step, lowers the limit.
+With drag this is on the safe side: the implicit drag then counts (2 - S) times.
+
 With local time stepping the step of level 0 is sought for which the same holds when the stiffness of every element is
 multiplied by the square of its own step over that of level 0, and the drag of a node by the step of its finest level.
 Where the stress that acts runs ahead by a share a of a step, dt^2 k (1 + 2 a) = 4 m: a damping of a dt k, explicit.
 
 With a share s of PIC velocities are multiplied by g = 1 - s + s f in a step, where 0 <= f <= 1 is what the way
 through the points leaves of the mode; then dt^2 k = 2 (1 + g) m, and dt sqrt(1 - s/2) is not above any of these.
+Without remapping it is dt^2 k = 2 (1 + g) m / (1 + g - S), which PIC raises.
 """
 
 import math
@@ -45,12 +51,14 @@ E_GRAINS, E_WATER, ELEMENT_WIDTH = 7, 13, 19
 @kernel
 def sum_points(
     first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, bulk_liquid, elements, rows,
-    geometry, stiffened, held, nodal, row_volume,
+    geometry, stiffened, undrained, held, nodal, row_volume,
 ):  # fmt: skip
     """Sum the points of a range of elements in these and at the nodes.
 
     stiffened : (n_elements,) float64
         Factor of the stiffness of an element.
+    undrained : bool
+        The pore water moves with the grains: its mass counts as theirs.
     held : (n_occupied, 19) float64
         Written: see the columns `E_`.
     nodal : (n_nodes, 4) float64
@@ -71,6 +79,8 @@ def sum_points(
             volume = mass / (soils[s, S_RHO_S] * (1.0 - n))
             water = volume * density_liquid
             stiff = volume * stiffened[e]
+            if undrained:
+                mass += n * water
             held[k, E_V] += volume
             if soils[s, S_SIN_DIL] > 0.0:
                 held[k, E_OWN] += volume
@@ -152,17 +162,19 @@ def sum_forces(first, last, occupied, elements, rows, geometry, held, velocity, 
         xx, yy = g1x * ux1 + g2x * ux2, g1y * uy1 + g2y * uy2
         xy = 0.5 * (g1y * ux1 + g2y * ux2 + g1x * uy1 + g2x * uy2)
         own = volume = xx + yy
-        liquid = 0.0
+        liquid = own
         if wet:
             liquid = g1x * (velocity[b, 2] - velocity[a, 2]) + g2x * (velocity[c, 2] - velocity[a, 2])
             liquid += g1y * (velocity[b, 3] - velocity[a, 3]) + g2y * (velocity[c, 3] - velocity[a, 3])
         if smoothing:
             r, s, t = rows[e, 0], rows[e, 1], rows[e, 2]
             volume = third * (divergence[r, 0] + divergence[s, 0] + divergence[t, 0])
-            liquid = volume + third * (divergence[r, 1] + divergence[s, 1] + divergence[t, 1])
+            liquid = volume
+            if wet:
+                liquid += third * (divergence[r, 1] + divergence[s, 1] + divergence[t, 1])
         skeleton = volume + held[k, E_OWN] * (own - volume)
         correction = 0.5 * (skeleton - own)
-        pressure = -(held[k, E_QS] * volume + held[k, E_QL] * liquid) if wet else 0.0
+        pressure = -(held[k, E_QS] * volume + held[k, E_QL] * liquid)
         sxx = held[k, E_LAMBDA] * skeleton + 2.0 * held[k, E_G] * (xx + correction) - pressure
         syy = held[k, E_LAMBDA] * skeleton + 2.0 * held[k, E_G] * (yy + correction) - pressure
         sxy = 2.0 * held[k, E_G] * xy
@@ -222,6 +234,7 @@ class Operator(NamedTuple):
     free: np.ndarray  # (n_nodes, 2) bool
     drag_time: np.ndarray
     smoothing: bool
+    remapping: bool
     element_cuts: np.ndarray  # (n_parts + 1,) as the others
     row_cuts: np.ndarray
     node_cuts: np.ndarray
@@ -337,6 +350,8 @@ def krylov_kernel(wet):
                             total += o.returned[p, i, x]
                             o.returned[p, i, x] = 0.0
                         image[i, x] = -total / o.nodal[i, x // 2] if o.free[i, x % 2] else 0.0
+                        if not o.remapping:
+                            image[i, x] = -2.0 * o.acceleration[i, x] - image[i, x]
                 for k in range(j + 1):
                     o.dots[part, k] = product(flat[k], flat[j + 1], width * first, width * last)
                 part = next_part(meeting, stage, thread, parts)
@@ -379,15 +394,16 @@ class Spectrum:
     def __init__(self, solver):
         mesh, levels, parts = solver.mesh, solver.levels, solver.parts
         n_nodes, n_rows = len(mesh.nodes), len(levels.of_row)
-        self.solver, self.wet = solver, solver.scene.water is not None
+        self.solver, self.wet = solver, solver.scene.is_two_phase
         self.shape = n_nodes, 4 if self.wet else 2
+        self.remapping = solver.scene.numerics.remapping
         self.step_of_node = 2.0 ** levels.of_row[:n_nodes]
         held, nodal = np.empty((solver.n_occupied, ELEMENT_WIDTH)), np.zeros((parts, n_nodes, 4))
         row_volume = np.zeros((parts, n_rows))
         solver.over_elements(
             sum_points, solver.occupied, solver.start, solver.order, solver.points, solver.soil_of_point, solver.soils,
             solver._water_density, solver._water_modulus, mesh.elements, levels.rows, solver.geometry,
-            levels.stiffened, held, per_range=(nodal, row_volume),
+            levels.stiffened, solver.scene.is_undrained, held, per_range=(nodal, row_volume),
         )  # fmt: skip
         nodal, row_volume = nodal.sum(axis=0), row_volume.sum(axis=0)
         occupied, row_spread = solver.occupied[: solver.n_occupied], np.zeros((parts, n_rows))
@@ -409,6 +425,7 @@ class Spectrum:
             free=(nodal[:, :1] > 0) & (fixed == 0),
             drag_time=self.step_of_node,
             smoothing=solver.scene.numerics.volumetric_smoothing,
+            remapping=self.remapping,
             **{f"{name}_cuts": np.linspace(0, size, parts + 1).astype(np.int64)
                for name, size in (("element", solver.n_occupied), ("row", n_rows), ("node", n_nodes))},
             divergence_of_part=np.zeros((parts, n_rows, 2)),
@@ -483,6 +500,8 @@ def spectral_time_step(solver, shortest, start=None):
         if not 0 < value < math.inf:
             return shortest, None
         dt = 2.0 / math.sqrt(value)
+    if not spectrum.remapping:
+        return SAFETY * dt, start
     longest = dt * 2.0 ** (solver.levels.count - 1)
     pic_share = -math.expm1(-solver.scene.numerics.pic_rate * longest)
     return SAFETY * math.sqrt(1 - 0.5 * pic_share) * dt, start

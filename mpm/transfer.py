@@ -109,15 +109,19 @@ def spread_volume(volume, area, fill0, fill1, fill2):
 
 
 @cache
-def advance_kernel(wet, tied):
-    """Kernel `advance_points` for points with pore water or without, on levels tied to each other or on one."""
+def advance_kernel(wet, undrained, tied, remapping):
+    """Kernel `advance_points` for points with pore water or without, on levels tied to each other or on one.
+
+    `undrained`: the water has the velocity of the grains. Without `remapping` no momenta are mapped back.
+    """
+    two_phase = wet and not undrained
 
     @kernel_part
     def advance_points(
         first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, rows, geometry, nodes,
         mean, level_of_element, dt_of_level, flip_of_level, filter_of_level, sums,
     ):  # fmt: skip
-        """Advance point velocities and positions from the nodes and map the new momenta back (MUSL).
+        """Advance point velocities and positions from the nodes and, with remapping, map new momenta back (MUSL).
 
         Velocities take `flip_of_level` of the FLIP and the rest of the PIC update; positions move with
         the solid. A pore pressure is drawn by `filter_of_level` towards its projection on continuous
@@ -127,7 +131,7 @@ def advance_kernel(wet, tied):
         mean : (n_rows - n_nodes, 6) float64
             Of rows tied to a finer one: mean velocities over the steps of their node, of :mod:`mpm.contact`.
         sums : (n_rows, 4) float64
-            Added: the new momenta of both phases [kg m/s per metre].
+            Added with remapping: the new momenta of both phases, or of the mixture [kg m/s per metre].
 
         Source: Sulsky, Zhou & Schreyer (1995) for MUSL; Zhu & Bridson (2005) for the PIC/FLIP blend.
         """
@@ -169,63 +173,71 @@ def advance_kernel(wet, tied):
                 vy = flip_fraction * vy + pic * gy
                 if wet:
                     w = m / (soils[index(soil_of_point[i]), S_RHO_S] * (1.0 - points[i, N])) * density_liquid
+                    smooth = n0 * nodes[a, V_P] + n1 * nodes[b, V_P] + n2 * nodes[c, V_P]
+                    points[i, P] += pressure_filter * (smooth - max(points[i, P], 0.0))
+                if undrained:
+                    m += points[i, N] * w
+                if two_phase:
                     hx = n0 * nodes[a, V_LX] + n1 * nodes[b, V_LX] + n2 * nodes[c, V_LX]
                     hy = n0 * nodes[a, V_LY] + n1 * nodes[b, V_LY] + n2 * nodes[c, V_LY]
                     ux = points[i, VLX] + n0 * nodes[a, V_DLX] + n1 * nodes[b, V_DLX] + n2 * nodes[c, V_DLX]
                     uy = points[i, VLY] + n0 * nodes[a, V_DLY] + n1 * nodes[b, V_DLY] + n2 * nodes[c, V_DLY]
                     ux = flip_fraction * ux + pic * hx
                     uy = flip_fraction * uy + pic * hy
-                    smooth = n0 * nodes[a, V_P] + n1 * nodes[b, V_P] + n2 * nodes[c, V_P]
-                    # the terms of each node in the order of its sums, so that they become vectors
-                    sx0 += n0 * (m * vx)
-                    sy0 += n0 * (m * vy)
-                    lx0 += n0 * (w * ux)
-                    ly0 += n0 * (w * uy)
-                    sx1 += n1 * (m * vx)
-                    sy1 += n1 * (m * vy)
-                    lx1 += n1 * (w * ux)
-                    ly1 += n1 * (w * uy)
-                    sx2 += n2 * (m * vx)
-                    sy2 += n2 * (m * vy)
-                    lx2 += n2 * (w * ux)
-                    ly2 += n2 * (w * uy)
+                    if remapping:
+                        # the terms of each node in the order of its sums, so that they become vectors
+                        sx0 += n0 * (m * vx)
+                        sy0 += n0 * (m * vy)
+                        lx0 += n0 * (w * ux)
+                        ly0 += n0 * (w * uy)
+                        sx1 += n1 * (m * vx)
+                        sy1 += n1 * (m * vy)
+                        lx1 += n1 * (w * ux)
+                        ly1 += n1 * (w * uy)
+                        sx2 += n2 * (m * vx)
+                        sy2 += n2 * (m * vy)
+                        lx2 += n2 * (w * ux)
+                        ly2 += n2 * (w * uy)
                     points[i, VSX], points[i, VSY], points[i, VLX], points[i, VLY] = vx, vy, ux, uy
-                    points[i, P] += pressure_filter * (smooth - max(points[i, P], 0.0))
                 else:
-                    sx0 += n0 * (m * vx)
-                    sy0 += n0 * (m * vy)
-                    sx1 += n1 * (m * vx)
-                    sy1 += n1 * (m * vy)
-                    sx2 += n2 * (m * vx)
-                    sy2 += n2 * (m * vy)
+                    if remapping:
+                        sx0 += n0 * (m * vx)
+                        sy0 += n0 * (m * vy)
+                        sx1 += n1 * (m * vx)
+                        sy1 += n1 * (m * vy)
+                        sx2 += n2 * (m * vx)
+                        sy2 += n2 * (m * vy)
                     points[i, VSX], points[i, VSY] = vx, vy
+                    if undrained:
+                        points[i, VLX], points[i, VLY] = vx, vy
                 if border:
                     gx += n0 * jx0 + n1 * jx1 + n2 * jx2
                     gy += n0 * jy0 + n1 * jy1 + n2 * jy2
                 points[i, X] += dt * gx
                 points[i, Y] += dt * gy
-            sums[a, 0] += sx0
-            sums[a, 1] += sy0
-            if wet:
-                sums[a, 2] += lx0
-                sums[a, 3] += ly0
-            sums[b, 0] += sx1
-            sums[b, 1] += sy1
-            if wet:
-                sums[b, 2] += lx1
-                sums[b, 3] += ly1
-            sums[c, 0] += sx2
-            sums[c, 1] += sy2
-            if wet:
-                sums[c, 2] += lx2
-                sums[c, 3] += ly2
+            if remapping:
+                sums[a, 0] += sx0
+                sums[a, 1] += sy0
+                if two_phase:
+                    sums[a, 2] += lx0
+                    sums[a, 3] += ly0
+                sums[b, 0] += sx1
+                sums[b, 1] += sy1
+                if two_phase:
+                    sums[b, 2] += lx1
+                    sums[b, 3] += ly1
+                sums[c, 0] += sx2
+                sums[c, 1] += sy2
+                if two_phase:
+                    sums[c, 2] += lx2
+                    sums[c, 3] += ly2
 
     return advance_points
 
 
 @cache
-def rates_kernel(wet):
-    """Kernel `element_rates` for points with pore water or without."""
+def rates_kernel(wet, undrained):
+    """Kernel `element_rates` for points with pore water or without, `undrained` where it moves with the grains."""
 
     @kernel_part
     def element_rates(first, last, occupied, rows, geometry, nodes, volume, fill, rates, sums):
@@ -258,10 +270,11 @@ def rates_kernel(wet):
                 sums[d, 1] += v * rates[e, R_DS]
                 sums[d, 8] += area
             if wet:
-                rates[e, R_DL] = (
-                    g1x * (nodes[b, V_LX] - nodes[a, V_LX]) + g2x * (nodes[c, V_LX] - nodes[a, V_LX])
-                    + g1y * (nodes[b, V_LY] - nodes[a, V_LY]) + g2y * (nodes[c, V_LY] - nodes[a, V_LY])
-                )  # fmt: skip
+                if not undrained:
+                    rates[e, R_DL] = (
+                        g1x * (nodes[b, V_LX] - nodes[a, V_LX]) + g2x * (nodes[c, V_LX] - nodes[a, V_LX])
+                        + g1y * (nodes[b, V_LY] - nodes[a, V_LY]) + g2y * (nodes[c, V_LY] - nodes[a, V_LY])
+                    )  # fmt: skip
                 pressed = volume[e, 1]
                 spread = pressed
                 if v > 0.0:
@@ -271,7 +284,8 @@ def rates_kernel(wet):
                 for d in (a, b, c):
                     sums[d, 2] += pressed
                     sums[d, 3] += pressed * rates[e, R_DS]
-                    sums[d, 4] += spread * (rates[e, R_DL] - rates[e, R_DS])
+                    if not undrained:
+                        sums[d, 4] += spread * (rates[e, R_DL] - rates[e, R_DS])
                     sums[d, 5] += px
                     sums[d, 6] += py
                     sums[d, 7] += spread
@@ -280,12 +294,15 @@ def rates_kernel(wet):
 
 
 @cache
-def update_kernel(wet, plastic, smoothing, dilatant, tied):
+def update_kernel(wet, undrained, plastic, smoothing, dilatant, tied):
     """Kernel `update_points` for what the scene has: pore water, plastic or dilatant soils, smoothed volume changes.
+
+    `undrained` pore water has the velocity of the grains: div v_s = div v_l, one momentum, no drag.
 
     A dilatant soil's skeleton takes the rates of its own element. Plastic volume from shear differs between elements,
     and so does the stress that follows; smoothed rates give no resistance to the motions that this drives, which grow.
     """
+    two_phase = wet and not undrained
 
     @kernel_part
     def update_points(
@@ -355,10 +372,11 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
                 # gradient of the projected pressure, less its nodal mean: zero for a linear pressure
                 px = g1x * (p1 - p0) + g2x * (p2 - p0) - third * (nodes[i0, V_GX] + nodes[i1, V_GX] + nodes[i2, V_GX])
                 py = g1y * (p1 - p0) + g2y * (p2 - p0) - third * (nodes[i0, V_GY] + nodes[i1, V_GY] + nodes[i2, V_GY])
-                own_l = dt * rates[e, R_DL]
+                own_l = dt * rates[e, R_DL] if two_phase else own_s
                 wet_s, wet_l = own_s, own_l
                 if smoothing and volume[e, 1] > 0.0:
-                    wet_s = dt * third * (nodes[i0, V_WS] + nodes[i1, V_WS] + nodes[i2, V_WS])
+                    wet_s = wet_l = dt * third * (nodes[i0, V_WS] + nodes[i1, V_WS] + nodes[i2, V_WS])
+                if smoothing and two_phase and volume[e, 1] > 0.0:
                     wet_l = dt * third * (nodes[i0, V_WL] + nodes[i1, V_WL] + nodes[i2, V_WL])
             correction = 0.5 * (ts - rates[e, R_DS])
             exx = dt * (rates[e, R_XX] + correction)
@@ -456,6 +474,27 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
                     fp += v * p
                     w = v * density_liquid
                     pore = n * w
+                if undrained:
+                    ms0 += n0 * m
+                    ml0 += n0 * w
+                    mn0 += n0 * pore
+                    q0 += n0 * excess
+                    ms1 += n1 * m
+                    ml1 += n1 * w
+                    mn1 += n1 * pore
+                    q1 += n1 * excess
+                    ms2 += n2 * m
+                    ml2 += n2 * w
+                    mn2 += n2 * pore
+                    q2 += n2 * excess
+                    m += pore
+                    sx0 += n0 * (m * vx)
+                    sy0 += n0 * (m * vy)
+                    sx1 += n1 * (m * vx)
+                    sy1 += n1 * (m * vy)
+                    sx2 += n2 * (m * vx)
+                    sy2 += n2 * (m * vy)
+                elif wet:
                     drag = pore * soils[s, S_DRAG]
                     ux, uy = points[i, VLX], points[i, VLY]
                     fastest = max(fastest, ux * ux + uy * uy)
@@ -525,11 +564,12 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
                 sums[i0, B_MS] += ms0
                 sums[i0, B_ML] += ml0
                 sums[i0, B_MN] += mn0
-                sums[i0, B_D] += d0
+                if two_phase:
+                    sums[i0, B_D] += d0
+                    sums[i0, B_PLX] += lx0
+                    sums[i0, B_PLY] += ly0
                 sums[i0, B_PSX] += sx0
                 sums[i0, B_PSY] += sy0
-                sums[i0, B_PLX] += lx0
-                sums[i0, B_PLY] += ly0
                 sums[i0, B_Q] += q0 - damped * (g0x * px + g0y * py)
                 sums[i0, B_FX] -= g0x * fxx + g0y * fxy
                 sums[i0, B_FY] -= g0x * fxy + g0y * fyy
@@ -538,11 +578,12 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
                 sums[i1, B_MS] += ms1
                 sums[i1, B_ML] += ml1
                 sums[i1, B_MN] += mn1
-                sums[i1, B_D] += d1
+                if two_phase:
+                    sums[i1, B_D] += d1
+                    sums[i1, B_PLX] += lx1
+                    sums[i1, B_PLY] += ly1
                 sums[i1, B_PSX] += sx1
                 sums[i1, B_PSY] += sy1
-                sums[i1, B_PLX] += lx1
-                sums[i1, B_PLY] += ly1
                 sums[i1, B_Q] += q1 - damped * (g1x * px + g1y * py)
                 sums[i1, B_FX] -= g1x * fxx + g1y * fxy
                 sums[i1, B_FY] -= g1x * fxy + g1y * fyy
@@ -551,11 +592,12 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
                 sums[i2, B_MS] += ms2
                 sums[i2, B_ML] += ml2
                 sums[i2, B_MN] += mn2
-                sums[i2, B_D] += d2
+                if two_phase:
+                    sums[i2, B_D] += d2
+                    sums[i2, B_PLX] += lx2
+                    sums[i2, B_PLY] += ly2
                 sums[i2, B_PSX] += sx2
                 sums[i2, B_PSY] += sy2
-                sums[i2, B_PLX] += lx2
-                sums[i2, B_PLY] += ly2
                 sums[i2, B_Q] += q2 - damped * (g2x * px + g2y * py)
                 sums[i2, B_FX] -= g2x * fxx + g2y * fxy
                 sums[i2, B_FY] -= g2x * fxy + g2y * fyy
@@ -588,7 +630,7 @@ def update_kernel(wet, plastic, smoothing, dilatant, tied):
 
 
 @cache
-def map_kernel(wet, tied):
+def map_kernel(wet, undrained, tied):
     """Kernel `map_point` for points with pore water or without; with levels a point may wait outside its element."""
 
     @kernel_part
@@ -622,18 +664,20 @@ def map_kernel(wet, tied):
                 weight, gx, gy = n2, geometry[2], geometry[3]
             b = sums[corner[k]]
             b[B_MS] += weight * m
-            b[B_PSX] += weight * m * row[VSX]
-            b[B_PSY] += weight * m * row[VSY]
+            moving = weight * (m + n * v * density_liquid) if undrained else weight * m
+            b[B_PSX] += moving * row[VSX]
+            b[B_PSY] += moving * row[VSY]
             b[B_FX] -= gx * fxx + gy * fxy
             b[B_FY] -= gx * fxy + gy * fyy
             if wet:
                 w = weight * v * density_liquid
                 b[B_ML] += w
                 b[B_MN] += n * w
-                b[B_D] += n * soil[S_DRAG] * w
                 b[B_Q] += weight * v * excess
-                b[B_PLX] += w * row[VLX]
-                b[B_PLY] += w * row[VLY]
+                if not undrained:
+                    b[B_D] += n * soil[S_DRAG] * w
+                    b[B_PLX] += w * row[VLX]
+                    b[B_PLY] += w * row[VLY]
                 b[B_FLX] += gx * v * p
                 b[B_FLY] += gy * v * p
         return v, fastest

@@ -9,8 +9,11 @@ import traceback
 
 import numpy as np
 
-#: Longest that reading a damaged file may take [s], and memory that it may ask for beyond what is in use [bytes].
+#: Longest that reading a damaged file may take [s of processor time], and memory that it may ask for beyond what is in
+#: use [bytes].
 PATIENCE, MEMORY = 20, 4_000_000_000
+#: On the clock it may take so many times as long: a busy machine is no hang, a process that sleeps for good is one.
+BUSY = 15
 
 
 def damaged(random, content):
@@ -56,7 +59,8 @@ def in_a_process(work, seconds=PATIENCE):
         try:
             used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
             resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, used + MEMORY))
-            signal.alarm(seconds)
+            signal.setitimer(signal.ITIMER_PROF, seconds)
+            signal.alarm(BUSY * seconds)
             try:
                 answer = "returned", work()
             except Exception as error:
@@ -84,7 +88,7 @@ def run_content(path):
     from coupling.datasets import read_run
     from coupling.info import describe
     from coupling.pressure_source import read_source
-    from coupling.report.page import collect
+    from coupling.report.run_page import collect
 
     content = {}
     for node in read_run(path).subtree:

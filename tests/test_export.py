@@ -200,7 +200,7 @@ def test_info_tells_what_a_file_is(folder, tmp_path):
         folder: "run folder",
         folder / "run.nc": "run file",
         folder.parent: "folder of runs",
-        report: "report of a run",
+        report: "report of a run or a study",
         picture: "picture (GIF)",
         series: "mesh or fields for ParaView",
         tmp_path / "pressures.nc": "pressures on a lining",

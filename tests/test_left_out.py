@@ -6,9 +6,41 @@ from small_event import small_scene
 
 import coupling
 import coupling.datasets
+import coupling.plan
 import mpm
 import mpm.scene
-from mpm.variables import EQ, SXX, SXY, SYY, SZZ, VLX, VLY, VSX, VSY, P, X, Y
+from mpm.contact import solve_nodes, solve_undrained_nodes
+from mpm.variables import (
+    B_D,
+    B_FLX,
+    B_FLY,
+    B_FX,
+    B_FY,
+    B_ML,
+    B_MN,
+    B_MS,
+    B_PLX,
+    B_PLY,
+    B_PSX,
+    B_PSY,
+    BUFFER_WIDTH,
+    EQ,
+    LEDGER,
+    NODE_WIDTH,
+    SXX,
+    SXY,
+    SYY,
+    SZZ,
+    V_SX,
+    V_SY,
+    VLX,
+    VLY,
+    VSX,
+    VSY,
+    P,
+    X,
+    Y,
+)  # fmt: skip
 
 MOTION = [X, Y, VSX, VSY, EQ]
 STRESS = [SXX, SYY, SZZ, SXY]
@@ -128,6 +160,74 @@ def test_undrained_ground_needs_no_smaller_step_and_is_the_limit_of_falling_perm
     assert np.abs(low[:, P] - lower[:, P]).max() < 1e-3 * lower[:, P].max()
     steps = [state.time_step_estimate()[0] for state in states]
     assert steps[0] == pytest.approx(steps[1], rel=0.02)  # the spectrum is known to a hundredth
+
+
+def undrained(**changes):
+    water = scene().water.model_copy(update={"drainage": "undrained"})
+    soil = scene().soils[0].model_copy(update={"hydraulic_conductivity": None})
+    return mpm.scene.Scene.model_validate(scene(water=water, soils=(soil,), **changes).model_dump())
+
+
+def test_undrained_scene_is_the_limit_of_falling_permeability():
+    soil = scene().soils[0].model_copy(update={"hydraulic_conductivity": 1e-12})
+    one, two = stepped(undrained()), stepped(scene(soils=(soil,)))
+    moved = np.hypot(two.points[:, VSX], two.points[:, VSY]).max()
+    assert moved > 1.0
+    assert np.array_equal(one.points[:, [VLX, VLY]], one.points[:, [VSX, VSY]])
+    # where the lining is, away from the gate, porosity is uniform: one weight, one velocity, a few roundings of k
+    for column in range(3):
+        assert np.abs(one.impulse[:, column] - two.impulse[:, column]).max() < 1e-6 * two.impulse[:, column].max()
+    # at the gate two velocities are mapped with two weights (grains, volume) that differ with the porosity, and the
+    # water's remapped one slides along walls on which grains stick: differences of an element, 2e-4, 4e-5 and 8e-4
+    for columns, most in ((MOTION[2:4], 1e-3), (STRESS, 2e-4), ([P], 3e-3)):
+        scale = np.abs(two.points[:, columns]).max()
+        assert np.abs(one.points[:, columns] - two.points[:, columns]).max() < most * scale, columns
+
+
+def test_wall_pushes_an_undrained_mixture_as_two_tied_phases():
+    """Random nodes at a wall: reactions and velocities of the limit of infinite drag of two momentum equations."""
+    n, random = 400, np.random.default_rng(2)
+    sums = np.zeros((1, n, BUFFER_WIDTH))
+    sums[0, :, B_MS], sums[0, :, B_ML] = random.uniform(1, 2, n), random.uniform(0.5, 1, n)
+    sums[0, :, B_MN], sums[0, :, B_D] = 0.45 * sums[0, :, B_ML], 1e16
+    speed, force = random.normal(size=(2, n)), random.normal(size=(4, n)) * 1e3
+    sums[0, :, [B_PSX, B_PSY]], sums[0, :, [B_PLX, B_PLY]] = speed * sums[0, :, B_MS], speed * sums[0, :, B_ML]
+    sums[0, :, [B_FX, B_FY, B_FLX, B_FLY]] = force
+    angle = random.uniform(0, 2 * np.pi, n)
+    normal = np.column_stack([np.cos(angle), np.sin(angle)])
+    row = np.arange(n, dtype=np.int32)
+    found = []
+    for solve, mixed in ((solve_nodes, False), (solve_undrained_nodes, True)):
+        given = sums.copy()
+        if mixed:
+            given[0, :, [B_PSX, B_PSY]] = speed * (sums[0, :, B_MS] + sums[0, :, B_MN])
+        nodes, impulse, ledger = np.zeros((n, NODE_WIDTH)), np.zeros((n, 5)), np.zeros(len(LEDGER))
+        solve(
+            0, n, row, np.full(n, -1, np.int32), np.zeros(n, np.int8), 0, np.array([1e-3]), given, np.zeros((0, 6)),
+            9.81, 1000.0, np.zeros(n, np.int8), row, normal, np.ones(n, np.int8), np.full(n, 0.2), None, nodes,
+            np.zeros(n, np.int8), impulse, ledger,
+        )  # fmt: skip
+        assert ledger[6] < 1e-12 * ledger[7]  # reactions explain the change of momentum
+        found.append((nodes[:, [V_SX, V_SY]], impulse / 1e-3))
+    (two, of_two), (one, of_one) = found
+    kinds = [(of_two[:, 0] > 0) & (of_two[:, 1] > 0), (of_two[:, 0] > 0) & (of_two[:, 1] == 0)]
+    kinds += [(of_two[:, 0] == 0) & (of_two[:, 1] > 0), (of_two[:, :2] == 0).all(axis=1)]
+    assert all(kind.any() for kind in kinds)  # both held, grains alone, water alone, none
+    # the drag over a step is 1e13 times a mass
+    assert np.abs(one - two).max() < 1e-9 * np.abs(two).max()
+    assert np.abs(of_one[:, :3] - of_two[:, :3]).max() < 1e-9 * np.abs(of_two).max()
+
+
+def test_undrained_scene_refuses_linings_that_move():
+    tunnel = scene().tunnels[0].model_copy(update={"lining": "floating"})
+    with pytest.raises(ValueError, match="drainage = 'undrained' needs linings that are held, got lining = 'floating'"):
+        undrained(tunnels=(tunnel,))
+
+
+def test_undrained_scene_has_one_velocity_in_the_plan():
+    case = coupling.load_scene("quick", water={"drainage": "undrained"})
+    velocities = [f for f in coupling.plan.features(case, 1) if f["feature"].startswith("two velocities")]
+    assert not velocities[0]["active"] and "undrained" in velocities[0]["reason"]
 
 
 def test_pressures_only_keeps_pressures_and_history_and_changes_no_bit_of_them(tmp_path):

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import coupling
 from coupling import datasets
 from coupling.cli import app
-from coupling.report import fields, numbers, page, series
+from coupling.report import fields, numbers, page, run_page, series
 from coupling.report.packing import evenly, unpacked
 
 
@@ -62,17 +62,17 @@ def test_initial_theory_is_given_only_where_it_holds(quick_scene):
 
 
 def test_warnings_name_what_is_missing_or_off(run, tree, tmp_path):
-    good = page.collect(run)
+    good = run_page.collect(run)
     assert [text for text in good["warnings"] if "records" not in text and "revision" not in text] == [
         text for text in good["warnings"] if text.startswith("Outside")
     ]
     # the synthetic pressures are no K0 state, which must be said
     assert any("against theory" in text for text in good["warnings"])
     short = write_run(tmp_path / "run.nc", times=(0.0, 0.5), models=(), status="interrupted")
-    told = " ".join(page.collect(short)["warnings"])
+    told = " ".join(run_page.collect(short)["warnings"])
     assert "'interrupted'" in told and "No lining model" in told and "Only 2 records" in told
     datasets.write_response(short, tree["structure/beam-spring"].to_dataset().isel(time=[0]))
-    assert "beam-spring holds 1 of 2 records" in " ".join(page.collect(short)["warnings"])
+    assert "beam-spring holds 1 of 2 records" in " ".join(run_page.collect(short)["warnings"])
 
 
 # -- what is put into the page ----------------------------------------------------------------------
@@ -85,7 +85,7 @@ def test_evenly_chosen_records_hold_the_ends():
 
 
 def test_embedded_series_are_the_datasets_values(run, tree):
-    player = page.collect(run)["player"]
+    player = run_page.collect(run)["player"]
     lining, tunnel = tree["lining"], player["lining"]["tunnels"][0]
     for name in series.PRESSURES:
         np.testing.assert_array_equal(unpacked(tunnel[name]), lining[name].values.astype("f4"))
@@ -147,7 +147,7 @@ def test_the_page_of_a_long_run_stays_under_ten_megabytes(tree, tmp_path):
     models = {f"/structure/{name}": response for name in ("beam-spring", "continuum", "third")}
     long = xr.DataTree.from_dict({"/lining": lining, "/history": history, "/points": many, "/mesh": mesh, **models})
     frames = series.choose_frames(long)
-    player = page._player(long, None, frames, fields.field_snapshots(many))
+    player = run_page._player(long, None, frames, fields.field_snapshots(many))
     size = len(json.dumps(player))
     # the rest of a page, style, script and text, is below 0.2 MB
     assert 2e6 < size < 9.8e6

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 from browser import Browser, find_browser
+from page_in_browser import CONTRAST, choose, number, show_frame, spoken, wider_than_the_screen, written_as
 from report_run import write_run
 from synthetic_run import record
 
@@ -27,30 +28,6 @@ CURVES = """(svg => {
   const paths = [...svg.querySelectorAll('path.initial, path.line')].map(p => p.getAttribute('d'));
   return [tick('.x-tick', 'x'), tick('.y-tick', 'y'), paths];
 })"""
-# Least contrast of a text with what lies under it (WCAG 2), that element, and how many were looked at.
-CONTRAST = """(() => {
-  const parts = c => c.match(/[\\d.]+/g).map(Number);
-  const linear = v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
-  const light = c => {
-    const [r, g, b] = parts(c).map(v => linear(v / 255));
-    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
-  };
-  const under = e => {
-    for (; e; e = e.parentElement) {
-      const c = getComputedStyle(e).backgroundColor;
-      if ((parts(c)[3] ?? 1) > 0) return c;
-    }
-    return 'rgb(255, 255, 255)';
-  };
-  const written = e => [...e.childNodes].some(n => n.nodeType === 3 && n.data.trim());
-  const seen = [...document.querySelectorAll('body *')].filter(e => !e.closest('script, style, noscript'));
-  const texts = seen.filter(written);
-  const found = texts.map(e => {
-    const s = getComputedStyle(e), a = light(e.closest('svg') ? s.fill : s.color), b = light(under(e));
-    return [(Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05), e.outerHTML.slice(0, 80)];
-  });
-  return found.sort((p, q) => p[0] - q[0])[0].concat(found.length);
-})()"""
 
 
 @pytest.fixture(scope="module")
@@ -83,32 +60,6 @@ def opened(report, browser):
     browser.open(report)
     yield browser
     assert browser.complaints == []
-
-
-def number(text):
-    """What is written, as a number."""
-    return float(text.replace("−", "-").replace("± ", ""))
-
-
-def written_as(value):
-    """Tolerance of a number shown with three digits."""
-    return pytest.approx(value, rel=6e-3, abs=1e-9)
-
-
-def choose(browser, select, value):
-    """Choose an entry of a select element."""
-    browser.evaluate(
-        f"(() => {{ const s = document.getElementById('{select}'); s.value = '{value}';"
-        " s.dispatchEvent(new Event('change')); })()"
-    )
-
-
-def show_frame(browser, frame):
-    """Move the slider, as dragging does."""
-    browser.evaluate(
-        f"(() => {{ const s = document.getElementById('time'); s.value = {frame};"
-        " s.dispatchEvent(new Event('input', {bubbles: true})); })()"
-    )
 
 
 def test_the_page_asks_for_nothing_but_itself(opened, report):
@@ -214,15 +165,15 @@ def test_unrolled_curves_lie_where_their_axes_say(opened, tree, frame):
 
 
 def test_keys_and_button_move_the_slider(opened):
-    value = "Number(document.getElementById('time').value)"
+    value = "Number(document.getElementById('slider').value)"
     assert opened.evaluate(value) == 4
-    opened.evaluate("document.getElementById('time').focus()")
+    opened.evaluate("document.getElementById('slider').focus()")
     positions = []
     for key in ("Home", "ArrowRight", "ArrowRight", "End", "ArrowLeft"):
         opened.press(key)
         positions.append(opened.evaluate(value))
     assert positions == [0, 1, 2, 4, 3]
-    spoken = opened.evaluate("document.getElementById('time').getAttribute('aria-valuetext')")
+    spoken = opened.evaluate("document.getElementById('slider').getAttribute('aria-valuetext')")
     assert spoken == "0.75 s, 225 kg/m" == opened.evaluate("document.getElementById('now').innerText")
     opened.press("End")
     opened.press(" ")
@@ -234,30 +185,14 @@ def test_keys_and_button_move_the_slider(opened):
 
 @pytest.mark.parametrize("width", [360, 390, 1366, 1920])
 def test_nothing_is_wider_than_the_screen(opened, width):
-    opened.resize(width, 844)
-    assert opened.evaluate("document.documentElement.scrollWidth") <= width
-    cut = opened.evaluate(
-        "[...document.querySelectorAll('h1, h2, h3, p, figure, button, select, .bar, dl')].filter(e =>"
-        " { const b = e.getBoundingClientRect(); return b.width && !e.classList.contains('skip') &&"
-        " (b.left < 0 || b.right > innerWidth + 0.5); }).map(e => e.outerHTML.slice(0, 80))"
-    )
-    assert cut == []
+    assert wider_than_the_screen(opened, width) == []
 
 
 def test_everything_that_takes_the_focus_has_a_name(opened):
-    nodes = opened.send("Accessibility.getFullAXTree")["nodes"]
-    focusable, unnamed = 0, []
-    for node in nodes:
-        properties = {p["name"]: p["value"].get("value") for p in node.get("properties", [])}
-        if properties.get("focusable") and node["role"]["value"] not in ("RootWebArea", "generic"):
-            focusable += 1
-            if not node.get("name", {}).get("value"):
-                unnamed.append(node["role"]["value"])
-    pictures = [n["name"]["value"] for n in nodes if n.get("role", {}).get("value") in ("image", "img")]
+    focusable, unnamed, pictures, levels = spoken(opened)
     assert focusable >= 8 and unnamed == []
     assert len(pictures) >= 12 and all(len(name) > 8 for name in pictures)
     assert opened.evaluate("document.documentElement.lang") == "en"
-    levels = opened.evaluate("[...document.querySelectorAll('h1, h2, h3')].map(h => Number(h.tagName[1]))")
     assert levels[0] == 1 and levels.count(1) == 1 and max(np.diff(levels)) <= 1
 
 

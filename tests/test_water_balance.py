@@ -20,8 +20,8 @@ def full_box(**numerics):
         "water": {"table_depth": 0.0, "density": 1000.0, "bulk_modulus": 8e7},
         "soils": [{
             "name": "sand", "top_depth": 0.0, "model": "elastic", "youngs_modulus": 4e7, "poissons_ratio": 0.3,
-            "cohesion": 0.0, "friction_angle": 30.0, "dilatancy_angle": 0.0, "porosity": 0.45, "loose_porosity": 0.55, "grain_density": 2650.0,
-            "hydraulic_conductivity": 1e-4, "k0": 0.5,
+            "cohesion": 0.0, "friction_angle": 30.0, "dilatancy_angle": 0.0, "porosity": 0.45, "loose_porosity": 0.55,
+            "grain_density": 2650.0, "hydraulic_conductivity": 1e-4, "k0": 0.5,
         }],
         "discretisation": {
             "element_size": 0.1, "element_size_lining": 0.1, "element_size_interior": 0.1, "gate_radius": 0.1,

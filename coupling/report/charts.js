@@ -1,5 +1,8 @@
-// Charts in SVG: over an axis, and around a ring. Both take rows of values and are redrawn by `set`.
+// Charts in SVG: over an axis, and around a ring. Both take rows of values and are redrawn by `set`; `marks` point at
+// the gaps: [{angle, text, colour}], colour and text may be missing.
 const WIDTH = 360;  // of every chart, in its own units; the page scales them
+const COLOURS = ["#0b5394", "#b04a00", "#2f6f1e", "#6a3d9a", "#a31621", "#00656e", "#7a5c00", "#4a4f57"];
+const DASHES = ["none", "8 3", "2 3", "8 3 2 3"];
 
 function element(name, attributes = {}, parent = null, text = null) {
   const made = document.createElementNS("http://www.w3.org/2000/svg", name);
@@ -39,7 +42,7 @@ function linePath(xs, ys) {
 }
 
 class LineChart {
-  constructor(svg, { x, xLabel, yRange, xTicks = null, classes, styles = [], mark = null, height = 240, onPick = null }) {
+  constructor(svg, { x, xLabel, yRange, xTicks = null, classes, styles = [], marks = [], height = 240, onPick = null }) {
     svg.replaceChildren();
     svg.setAttribute("viewBox", `0 0 ${WIDTH} ${height}`);
     Object.assign(this, { svg, x, box: { left: 50, right: WIDTH - 12, top: 18, bottom: height - 40 } });
@@ -47,6 +50,7 @@ class LineChart {
     this.xRange = xTicks ? [xTicks[0], xTicks[xTicks.length - 1]] : [x[0], x[x.length - 1]];
     if (this.xRange[1] <= this.xRange[0]) this.xRange[1] = this.xRange[0] + 1;
     this.yRange = yRange;
+    this.dots = [];
     for (const value of ticks(...yRange, 5)) {
       const y = this.atY(value);
       element("line", { x1: left, x2: right, y1: y, y2: y, class: value === 0 ? "zero" : "rule" }, svg);
@@ -63,17 +67,27 @@ class LineChart {
       Object.assign(path.style, styles[k] || {});
       return path;
     });
-    if (mark !== null) {
-      const at = this.atX(mark);
-      element("path", { d: `M${at - 5} ${top - 10}h10l-5 9z`, class: "gate" }, svg);
-      element("text", { x: at + 8, y: top - 2, class: "tick gate" }, svg, "gap");
+    for (const { angle, text, colour } of marks) {
+      const at = this.atX(angle);
+      element("path", { d: `M${at - 5} ${top - 10}h10l-5 9z`, class: "gate" }, svg).style.fill = colour || "";
+      if (text) element("text", { x: at + 8, y: top - 2, class: "tick gate" }, svg, text);
     }
     if (onPick) this.pickWith(onPick);
   }
   atX(value) { return this.box.left + (value - this.xRange[0]) / (this.xRange[1] - this.xRange[0]) * (this.box.right - this.box.left); }
   atY(value) { return this.box.bottom - (value - this.yRange[0]) / (this.yRange[1] - this.yRange[0]) * (this.box.bottom - this.box.top); }
-  set(k, values, factor) {
-    this.lines[k].setAttribute("d", linePath(Array.from(this.x, (v) => this.atX(v)), Array.from(values, (v) => this.atY(v * factor))));
+  set(k, values, factor, x = this.x) {
+    this.lines[k].setAttribute("d", linePath(Array.from(x, (v) => this.atX(v)), Array.from(values, (v) => this.atY(v * factor))));
+  }
+  // a dot on a line; none where a coordinate is unknown
+  dot(k, x, y, factor) {
+    const circle = this.dots[k] = this.dots[k] || element("circle", { r: 3.5, class: "dot" }, this.svg);
+    const known = Number.isFinite(x) && Number.isFinite(y);
+    circle.style.fill = this.lines[k].style.stroke;
+    circle.style.display = known ? "" : "none";
+    if (!known) return;
+    circle.setAttribute("cx", this.atX(x).toFixed(2));
+    circle.setAttribute("cy", this.atY(y * factor).toFixed(2));
   }
   cursor(value) {
     this.line = this.line || element("line", { class: "cursor", y1: this.box.top, y2: this.box.bottom }, this.svg);
@@ -91,7 +105,7 @@ class LineChart {
 }
 
 class PolarChart {
-  constructor(svg, { x, yRange, classes, mark = null }) {
+  constructor(svg, { x, yRange, classes, styles = [], marks = [] }) {
     svg.replaceChildren();
     svg.setAttribute("viewBox", `0 0 ${WIDTH} 330`);
     const [low, high] = yRange, outer = 132;
@@ -99,23 +113,28 @@ class PolarChart {
     for (let degree = 0; degree < 360; degree += 45) {
       const [a, b] = [this.place(degree, low), this.place(degree, high)], label = this.turn(degree, outer + 18);
       element("line", { x1: a[0], y1: a[1], x2: b[0], y2: b[1], class: "rule" }, svg);
-      const apart = mark === null ? 180 : Math.abs((degree - mark + 540) % 360 - 180);
-      if (apart > 15) element("text", { x: label[0], y: label[1] + 4, "text-anchor": "middle", class: "tick" }, svg, `${degree}°`);
+      const apart = marks.map((m) => Math.abs((degree - m.angle + 540) % 360 - 180));
+      if (Math.min(180, ...apart) > 15) element("text", { x: label[0], y: label[1] + 4, "text-anchor": "middle", class: "tick" }, svg, `${degree}°`);
     }
-    const labelled = (mark === null ? 172 : mark + 202.5) % 360, rings = ticks(low, high, 4);
+    const labelled = (marks.length === 1 ? marks[0].angle + 202.5 : 172) % 360, rings = ticks(low, high, 4);
     for (const value of rings) {
       element("circle", { cx: this.cx, cy: this.cy, r: this.radius(value), class: value === 0 ? "zero" : "rule" }, svg);
     }
-    this.lines = classes.map((name) => element("path", { class: name }, svg));
+    this.lines = classes.map((name, k) => {
+      const path = element("path", { class: name }, svg);
+      Object.assign(path.style, styles[k] || {});
+      return path;
+    });
     for (const value of rings) {
       if (value === low && this.inner === 0) continue;
       const [a, b] = this.place(labelled, value);
       element("text", { x: a, y: b + 4, "text-anchor": "middle", class: "tick halo y-tick" }, svg, tickText(value));
     }
-    if (mark !== null) {
-      const [a, b] = this.turn(mark, outer + 3), text = this.turn(mark, outer + 27);
-      element("path", { d: "M-6 -11h12l-6 11z", class: "gate", transform: `translate(${a.toFixed(1)} ${b.toFixed(1)}) rotate(${mark})` }, svg);
-      element("text", { x: text[0], y: text[1] + 4, "text-anchor": "middle", class: "tick gate" }, svg, "gap");
+    for (const { angle, text, colour } of marks) {
+      const [a, b] = this.turn(angle, outer + 3), [x, y] = this.turn(angle, outer + 27);
+      element("path", { d: "M-6 -11h12l-6 11z", class: "gate", transform: `translate(${a.toFixed(1)} ${b.toFixed(1)}) rotate(${angle})` }, svg)
+        .style.fill = colour || "";
+      if (text) element("text", { x, y: y + 4, "text-anchor": "middle", class: "tick gate" }, svg, text);
     }
   }
   radius(value) { return this.inner + (value - this.low) / (this.high - this.low) * (this.outer - this.inner); }

@@ -1,6 +1,4 @@
 // What is drawn over time, with a cursor at the slider's time; a click moves the slider.
-const COLOURS = ["#0b5394", "#b04a00", "#2f6f1e", "#6a3d9a"], DASHES = ["none", "8 3", "2 3", "8 3 2 3"];
-
 class TimeChart {
   // lines: [{name, model, time, values, factor, style}]; lines of one name differ by their model only
   constructor(key, svg, lines, onPick, { fromZero = true, unit = "" } = {}) {
@@ -25,15 +23,6 @@ class TimeChart {
     caption(this.key, ...this.legend, sentence(told));
     this.svg.setAttribute("aria-label", `${this.key.replace(/_/g, " ")} over time, now ${told}`);
   }
-}
-
-function nearest(ascending, value) {
-  let low = 0, high = ascending.length - 1;
-  while (high - low > 1) {
-    const middle = (low + high) >> 1;
-    if (ascending[middle] <= value) low = middle; else high = middle;
-  }
-  return Math.abs(ascending[low] - value) <= Math.abs(ascending[high] - value) ? low : high;
 }
 
 function timeCharts(onPick) {

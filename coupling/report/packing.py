@@ -14,10 +14,23 @@ def packed(values, kind="f4"):
     return {"kind": kind, "shape": list(array.shape), "data": base64.b64encode(array.tobytes()).decode()}
 
 
+def packed_levels(values):
+    """An array as two bytes a value: 65535 levels over its range, NaN kept; half a level off at most.
+
+    values : float array;  returns {kind, shape, data, low, step}: value = low + step times the number, 65535 is NaN.
+    """
+    values = np.asarray(values, float)
+    known = np.isfinite(values)
+    low, high = (float(values[known].min()), float(values[known].max())) if known.any() else (0.0, 0.0)
+    step = (high - low) / 65534 or 1.0
+    levels = np.where(known, np.rint((np.where(known, values, low) - low) / step), 65535)
+    return {**packed(levels, "u2"), "low": low, "step": step}
+
+
 def unpacked(entry):
-    """The array that :func:`packed` made a text of."""
-    flat = np.frombuffer(base64.b64decode(entry["data"]), dtype=f"<{entry['kind']}")
-    return flat.reshape(entry["shape"])
+    """The array that :func:`packed` or :func:`packed_levels` made a text of."""
+    array = np.frombuffer(base64.b64decode(entry["data"]), dtype=f"<{entry['kind']}").reshape(entry["shape"])
+    return array if "step" not in entry else np.where(array == 65535, np.nan, entry["low"] + entry["step"] * array)
 
 
 def quantised(values, low, high, kind="u1"):

@@ -1,34 +1,29 @@
-"""The page about a run: collected from its datasets, put together with its style and script, written as one file."""
+"""A report as one file: of a run or of a study, told apart by what lies in the folder, put together and written."""
 
+import contextlib
 import os
 import tempfile
 from importlib import resources
 from pathlib import Path
 
-from coupling.datasets import RunFileError, read_run, run_file
-from coupling.report.fields import field_snapshots, mesh_picture
-from coupling.report.markup import document
-from coupling.report.numbers import key_numbers, quality, warnings
-from coupling.report.packing import packed
-from coupling.report.scene_facts import facts, left_out, read_scene, section
-from coupling.report.series import choose_frames, history_series, lining_series, model_names, model_series
-from coupling.run_folder import REPORT_FILE, RunRefused
-from coupling.summary import summarise_run
+from coupling.datasets import run_file
+from coupling.report.frame import document
+from coupling.run_folder import REPORT_FILE, RUN_FILE, RunRefused
 
-SCRIPTS = ("unpack.js", "charts.js", "ring_views.js", "history_views.js", "field_views.js", "player.js")
 MARK = '<meta name="generator" content="gushing report">'
 
 
-def write_report(run, out=None):
-    """Write the page about a run.
+def write_report(path, out=None):
+    """Write the page about a run or a study.
 
     Parameters
     ----------
-    run : str or path
-        Run folder or file; one that still goes on or was interrupted shows what it has.
+    path : str or path
+        Folder of a run or its file, of a study or its `study.json`; what still goes on or was interrupted shows what
+        it has.
     out : str or path, optional
-        The HTML file, or the folder for it; `report.html` in the run's folder when left out. An earlier report is
-        replaced, nothing else.
+        The HTML file, or the folder for it; `report.html` in the folder of the run or study when left out. An earlier
+        report is replaced, nothing else.
 
     Returns
     -------
@@ -39,88 +34,79 @@ def write_report(run, out=None):
     RunFileError
         No run, or one without a record.
     RunRefused
-        `out` exists and is no report, or its folder does not exist.
+        Neither a run nor a study; `out` exists and is no report, or its folder does not exist.
+    coupling.studies.design.StudyError
+        A study whose definition cannot be read.
     """
-    path = _checked_path(run_file(run), out)
-    text = document(collect(run), _file("page.css"), "\n".join(_file(name) for name in SCRIPTS), MARK)
-    with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".html", delete=False, encoding="utf-8") as stream:
+    folder = study_folder(path)
+    if folder is None:
+        from coupling.report import run_markup, run_page
+
+        target = _checked_path(run_file(path).parent, out)
+        data, parts, scripts = run_page.collect(path), run_markup.parts, run_page.SCRIPTS
+    else:
+        from coupling.report import study_markup, study_page
+
+        target = _checked_path(folder, out)
+        data, parts, scripts = study_page.collect(folder, target.parent), study_markup.parts, study_page.SCRIPTS
+    text = document(*parts(data), data["player"], _file("page.css"), "\n".join(map(_file, scripts)), MARK)
+    with tempfile.NamedTemporaryFile("w", dir=target.parent, suffix=".html", delete=False, encoding="utf-8") as stream:
         stream.write(text)
     os.chmod(stream.name, 0o644)
-    os.replace(stream.name, path)
-    return path
+    os.replace(stream.name, target)
+    return target
 
 
-def collect(run):
-    """Everything that the page shows.
+def write_run_reports(folder):
+    """Write the pages of all runs of a study beside them; a run without a record gets none. Returns their paths."""
+    from coupling.datasets import RunFileError
+    from coupling.studies.case import RUN_FOLDER
+    from coupling.studies.collect import stored_cases
+    from coupling.studies.execute import case_file
 
-    Returns
-    -------
-    dict
-        attributes, summary, numbers, quality, warnings, notes, facts, left_out: for the text; player: what the script
-        draws, JSON.
+    written = []
+    for case in stored_cases(folder)[1]:
+        run = case_file(Path(folder), case).parent / RUN_FOLDER
+        if (run / RUN_FILE).is_file():
+            with contextlib.suppress(RunFileError):
+                written.append(write_report(run))
+    return written
+
+
+def study_folder(path):
+    """The folder of a study that a path names; None where it can only be a run.
+
+    Raises
+    ------
+    RunRefused
+        A folder that holds neither or both.
     """
-    tree = read_run(run)
-    attributes = {name: _plain(value) for name, value in tree.attrs.items()}
-    if "history" not in tree.children or "lining" not in tree.children:
-        raise RunFileError(f"run file '{run_file(run)}': it holds no run; give the folder that `gush run` wrote")
-    if not min(tree["lining"].sizes["time"], tree["history"].sizes["time"]):
-        raise RunFileError(f"run file '{run_file(run)}': has no complete record yet; wait for the first one")
-    scene, summary = read_scene(attributes), summarise_run(run)
-    quality_rows = quality(tree, summary, scene)
-    frames = choose_frames(tree)
-    fields = field_snapshots(tree["points"].to_dataset()) if "points" in tree.children else None
-    return {
-        "attributes": attributes,
-        "summary": summary,
-        "numbers": key_numbers(tree),
-        "quality": quality_rows,
-        "warnings": warnings(tree, attributes, quality_rows),
-        "notes": _thinned(tree, frames, fields, scene),
-        "facts": [] if scene is None else facts(scene),
-        "left_out": [] if scene is None else left_out(scene),
-        "player": _player(tree, scene, frames, fields),
-    }
+    from coupling.studies.execute import DATA_FILE, STUDY_FILE
+
+    path = Path(path)
+    if not path.is_dir():
+        return path.parent if path.is_file() and path.name in (STUDY_FILE, DATA_FILE) else None
+    run, study = (path / RUN_FILE).exists(), (path / STUDY_FILE).exists()
+    if run and study:
+        raise RunRefused(f"'{path}': holds a run ({RUN_FILE}) and a study ({STUDY_FILE}); name one of these files")
+    if not run and not study:
+        inner = sorted(file.parent.name for name in (RUN_FILE, STUDY_FILE) for file in path.glob(f"*/{name}"))
+        hint = f", for instance {path / inner[0]}" if inner else ""
+        raise RunRefused(
+            f"'{path}': must be the folder of a run (with {RUN_FILE}) or of a study (with {STUDY_FILE}), it holds "
+            f"neither; give the one that `gush run` or `gush study` wrote{hint}"
+        )
+    return path if study else None
 
 
-def _player(tree, scene, frames, fields):
-    lining = tree["lining"].to_dataset()
-    times = lining["time"].values[frames]
-    return {
-        "time": packed(times),
-        "inflow_mass": packed(lining["inflow_mass"].values[frames]),
-        "section": section(scene, lining.attrs),
-        "lining": lining_series(tree, frames),
-        "models": [model_series(name, tree[f"structure/{name}"].to_dataset(), times) for name in model_names(tree)],
-        "history": history_series(tree),
-        "mesh": mesh_picture(tree["mesh"].to_dataset()) if "mesh" in tree.children else None,
-        "fields": fields,
-    }
-
-
-def _thinned(tree, frames, fields, scene):
-    """What the page leaves out of the datasets, as sentences."""
-    told, records = [], tree["lining"].sizes["time"]
-    if len(frames) < records:
-        told.append(f"The slider stops at {len(frames)} of {records} records; run.nc holds them all.")
-    if fields is not None:
-        shown, shares = len(fields["snapshots"]), [s["drawn"] / max(s["present"], 1) for s in fields["snapshots"]]
-        if shown < fields["available"]:
-            told.append(f"The fields are shown at {shown} of {fields['available']} stored times.")
-        if min(shares) < 1:
-            told.append(f"The fields show {min(shares):.0%} of the points in view, drawn larger.")
-    if scene is None:
-        told.append("This version of the program does not understand the run's scene; only its text is shown.")
-    return told
-
-
-def _checked_path(file, out):
-    path = file.parent / REPORT_FILE if out is None else Path(out)
+def _checked_path(folder, out):
+    path = folder / REPORT_FILE if out is None else Path(out)
     if path.is_dir():
         path = path / REPORT_FILE
     if not path.absolute().parent.is_dir():
         raise RunRefused(f"report '{path}': its folder does not exist; make it or choose another --out")
     if path.exists() and not is_report(path):
-        raise RunRefused(f"report '{path}': exists and is no report of a run; choose another --out")
+        raise RunRefused(f"report '{path}': exists and is no report of this program; choose another --out")
     return path
 
 
@@ -134,8 +120,4 @@ def _file(name):
     return (resources.files("coupling.report") / name).read_text(encoding="utf-8")
 
 
-def _plain(value):
-    return value.item() if hasattr(value, "item") and getattr(value, "size", 1) == 1 else value
-
-
-__all__ = ["collect", "is_report", "write_report"]
+__all__ = ["is_report", "study_folder", "write_report", "write_run_reports"]

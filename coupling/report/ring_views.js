@@ -12,7 +12,7 @@ class RingChart {
   build() {
     const lines = this.sources(), svg = document.getElementById(this.key);
     const range = roundRange(rangeOf(this.compared(), this.factor), true);
-    const options = { x: this.angles, yRange: range, mark: gate ? gate.angle : null,
+    const options = { x: this.angles, yRange: range, marks: gate ? [{ angle: gate.angle, text: "gap" }] : [],
       classes: ["initial", ...lines.map((_, k) => modelClass(k))] };
     this.chart = shape === "polar" ? new PolarChart(svg, options) : new LineChart(svg, { ...options,
       xLabel: "angle from the crown, clockwise [°]", xTicks: [0, 60, 120, 180, 240, 300, 360], height: 250 });
@@ -131,28 +131,6 @@ class DeformedRing {
 
 const JOINT_COLUMNS = [["joint_axial_force", "N"], ["joint_shear_force", "Q"], ["joint_bending_moment", "M"],
   ["joint_opening", "opening"], ["joint_dislocation", "dislocation"], ["joint_rotation", "rotation"]];
-
-function cell(row, text, { head = null, number = false, small = null } = {}) {
-  const made = document.createElement(head ? "th" : "td");
-  if (head) made.scope = head;
-  if (number) made.className = "number";
-  made.append(text);
-  if (small !== null) {
-    const below = document.createElement("small");
-    below.textContent = small;
-    made.append(below);
-  }
-  row.append(made);
-  return made;
-}
-
-function tableWith(table, text, headings) {
-  table.replaceChildren();
-  table.createCaption().textContent = text;
-  const row = table.createTHead().insertRow();
-  for (const [name, number] of headings) cell(row, name, { head: "col", number });
-  return table.createTBody();
-}
 
 function drawJointTable(frame) {
   const body = tableWith(document.getElementById("joint-table"), "Now; below each value that of the start.",

@@ -24,13 +24,16 @@ def facts(scene):
     s = scene.mpm
     rows = [("box", f"{s.box.width:g} m wide, {s.box.depth:g} m deep")]
     rows.append(("water table", "dry ground" if s.water is None else f"{s.water.table_depth:g} m below the surface"))
+    if s.is_undrained:
+        rows.append(("drainage", "none: water moves with the grains"))
     if s.water is not None:
         rows.append(("bulk modulus of the water", f"{s.water.bulk_modulus / 1e6:g} MPa"))
     for soil in s.soils:
         strength = ""
         if soil.model == "mohr-coulomb":
             strength = f", c' {soil.cohesion / 1e3:g} kPa, φ' {soil.friction_angle:g}°, ψ {soil.dilatancy_angle:g}°"
-        flow = "" if soil.hydraulic_conductivity is None else f", k {soil.hydraulic_conductivity:.3g} m/s"
+        known = s.is_two_phase and soil.hydraulic_conductivity is not None
+        flow = "" if not known else f", k {soil.hydraulic_conductivity:.3g} m/s"
         rows.append((
             f"soil '{soil.name}' from {soil.top_depth:g} m",
             f"{soil.model}, E {soil.youngs_modulus / 1e6:g} MPa, ν {soil.poissons_ratio:g}{strength}, "

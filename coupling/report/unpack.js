@@ -5,26 +5,15 @@ const KINDS = { f4: Float32Array, u1: Uint8Array, u2: Uint16Array, u4: Uint32Arr
 function unpack(entry) {
   const text = atob(entry.data), bytes = new Uint8Array(text.length);
   for (let k = 0; k < text.length; k++) bytes[k] = text.charCodeAt(k);
-  const values = new KINDS[entry.kind](bytes.buffer), width = entry.shape.length > 1 ? entry.shape[1] : 1;
+  const stored = new KINDS[entry.kind](bytes.buffer), width = entry.shape.length > 1 ? entry.shape[1] : 1;
+  const values = entry.step === undefined ? stored
+    : Float32Array.from(stored, (v) => (v === 65535 ? NaN : entry.low + v * entry.step));
   return { values, width, row: (k) => values.subarray(k * width, (k + 1) * width) };
 }
 
 function unpackAll(entries) {
   return Object.fromEntries(Object.entries(entries).map(([name, entry]) => [name, unpack(entry)]));
 }
-
-const times = unpack(data.time).values, inflow = unpack(data.inflow_mass).values;
-const tunnels = data.lining ? data.lining.tunnels.map(unpackAll) : [];
-const models = data.models.map((model) => ({
-  ...model, fields: unpackAll(model.fields), joints: unpackAll(model.joints),
-  series: Object.fromEntries(Object.entries(model.series).map(([k, v]) => [k, { ...v, ...unpack(v) }])),
-}));
-const history = {
-  time: unpack(data.history.time).values,
-  series: Object.fromEntries(Object.entries(data.history.series).map(([k, v]) => [k, { ...v, ...unpack(v) }])),
-};
-const gate = data.section.gate;
-const home = data.section.tunnels[gate ? gate.tunnel : 0];
 
 const QUANTITIES = {
   soil_pressure: ["kPa", 1e-3], water_pressure: ["kPa", 1e-3], soil_shear: ["kPa", 1e-3],
@@ -64,4 +53,14 @@ function extremes(values, factor, angles) {
   }
   if (low < 0) return null;
   return { min: values[low] * factor, max: values[high] * factor, minAt: angles[low], maxAt: angles[high] };
+}
+
+// Index of the value that is nearest.
+function nearest(ascending, value) {
+  let low = 0, high = ascending.length - 1;
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (ascending[middle] <= value) low = middle; else high = middle;
+  }
+  return Math.abs(ascending[low] - value) <= Math.abs(ascending[high] - value) ? low : high;
 }

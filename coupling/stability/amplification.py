@@ -54,7 +54,9 @@ class Column:
         Of random positions.
     skew : float
         Largest shift of the inner nodes over the cell [-].
-    pic_rate, pressure_filter, volumetric_smoothing
+    drainage
+        As in `mpm.scene.Water`.
+    pic_rate, pressure_filter, volumetric_smoothing, remapping
         As in `mpm.scene.Numerics`.
     """
 
@@ -72,14 +74,18 @@ class Column:
     pic_rate: float = 10.0
     pressure_filter: float = 0.2
     volumetric_smoothing: bool = True
+    remapping: bool = True
     poissons_ratio: float = 0.3
+    drainage: str = "two-phase"
 
     def scene(self):
         """The scene of the column."""
         width, height = 2 * self.size * self.aspect, self.cells * self.size
         size = {f"element_size{part}": self.size for part in ("", "_lining", "_interior")}
         wet = self.bulk_modulus is not None
-        water = {"table_depth": 0.0, "density": 1000.0, "bulk_modulus": self.bulk_modulus} if wet else None
+        water = {
+            "table_depth": 0.0, "density": 1000.0, "bulk_modulus": self.bulk_modulus, "drainage": self.drainage,
+        } if wet else None  # fmt: skip
         return Scene.model_validate({
             "name": "column",
             "box": {"width": width, "depth": height},
@@ -93,8 +99,8 @@ class Column:
             "discretisation": {**size, "gate_radius": self.size, "points_per_element": self.points},
             "numerics": {
                 "courant": 1.0, "pic_rate": self.pic_rate, "pressure_filter": self.pressure_filter,
-                "volumetric_smoothing": self.volumetric_smoothing, "critical_step": "altitude",
-                "local_time_stepping": False,
+                "volumetric_smoothing": self.volumetric_smoothing, "remapping": self.remapping,
+                "critical_step": "altitude" if self.remapping else "spectral", "local_time_stepping": False,
             },
             "stop": {"time": 1.0},
             "output": {"interval": 1.0},
@@ -150,6 +156,7 @@ class Amplification:
         stress = speed * solver.wave_speed * 2000.0
         solver.points[:, P] = 10 * stress if self._wet else 0.0  # positive, whatever is added
         solver.nodes[:, V_P] = solver.points[:, P].max()
+        solver.limit_speed = solver.wave_speed
         self.altitude = solver.time_step_estimate()[0]
         self.spectral, _ = spectral_time_step(solver, 0.5 * self.altitude)
         self._start = _copied(solver)

@@ -49,6 +49,8 @@ def _boxes():
         loose = min(value + 0.1, 0.9)
         yield case(f"n={value:g}", "porosity [-]", porosity=value, loose_porosity=loose)
     yield case("dry", "no water", bulk_modulus=None)
+    yield case("undrained", "water moves with the grains", drainage="undrained")
+    yield case("undrained,K_w=1e+11", "the same, stiff water", drainage="undrained", bulk_modulus=1e11)
     yield case("dry,E=1e+10", "no water, stiff", bulk_modulus=None, youngs_modulus=1e10)
     yield case("no gravity", "gravity 0: nothing must move", gravity=0.0)
     yield case("gravity=100", "centrifuge, 10 g", gravity=100.0)
@@ -66,6 +68,7 @@ def _boxes():
     yield case("pic=0", "pure FLIP", pic_rate=0.0)
     yield case("pic=1e6", "pure PIC", pic_rate=1e6)
     yield case("no smoothing", "no volumetric smoothing", volumetric_smoothing=False)
+    yield case("no remapping", "strains from the solved velocities (USL)", remapping=False)
     yield case("E=1e+10,K_w=1e+06", "stiff skeleton, soft water", youngs_modulus=1e10, bulk_modulus=1e6)
     yield case("E=1e+05,K_w=1e+11", "soft skeleton, stiff water", youngs_modulus=1e5, bulk_modulus=1e11)
     yield case("size=1mm", "elements of 1 mm", size=1e-3, seconds=0.02)
@@ -88,6 +91,7 @@ def _tunnels():
     yield case("phi=50,psi=10,gate", "dilatant", friction_angle=50.0, dilatancy_angle=10.0)
     yield case("phi=50,psi=50,gate", "associated", friction_angle=50.0, dilatancy_angle=50.0)
     yield case("dry,gate", "no water", water=False)
+    yield case("undrained,gate", "water moves with the grains", drainage="undrained")
     yield case("no gravity,gate", "gravity 0", gravity=0.0)
     for ratio in (0.3, 1.0, 5.0, 20.0):
         yield case(f"cover={ratio:g}D", "cover over the outer diameter", cover=ratio, representative=ratio == 0.3)
@@ -97,6 +101,7 @@ def _tunnels():
     for angle in (0.0, 45.0, 180.0):
         yield case(f"gate at {angle:g}", "angle of the gate [degree]", angle=angle)
     yield case("sink", "material taken out behind the gate", interior="sink")
+    yield case("no remapping,gate", "strains from the solved velocities (USL)", remapping=False, seconds=0.1)
     yield case("full", "tunnel filled to the crown, gate open: rest", filled_tunnel, True)
     yield case(
         "filling", "a small tunnel until nothing more fits", gate, diameter=1.0, width=0.2, cover=3.0, seconds=3.0
@@ -113,6 +118,7 @@ def _motions():
     yield Case("jet 30 m/s", "a lump of soil and water at 30 m/s against a wall", jet, {}, True)
     yield Case("jet 30 m/s,K_w=2.2e9", "with real water", jet, {"bulk_modulus": 2.2e9, "seconds": 0.1})
     yield Case("jet 30 m/s,dry", "without water", jet, {"bulk_modulus": None})
+    yield Case("jet 30 m/s,undrained", "water moves with the grains", jet, {"drainage": "undrained"})
     yield Case("jet 300 m/s", "near the wave speed", jet, {"speed": 300.0, "seconds": 0.05})
     yield Case("water only", "grains do not touch: a dam of slurry breaks", slurry, {}, True)
     yield Case("water only,k=10", "and hardly hold the water", slurry, {"hydraulic_conductivity": 10.0})

@@ -43,6 +43,15 @@ def columns():
             "positions",
             Column(positions=place, points=points, seed=seed, bulk_modulus=modulus, volumetric_smoothing=smoothing),
         )
+    for (place, points, seed), modulus in itertools.product(POSITIONS, (None, 8e7)):
+        yield "no remapping", Column(positions=place, points=points, seed=seed, bulk_modulus=modulus, remapping=False)
+    for modulus, stiffness, smoothing in itertools.product((1e6, 8e7, 2.2e9), (1e5, 4e7, 1e10), (True, False)):
+        yield (
+            "undrained",
+            Column(
+                bulk_modulus=modulus, youngs_modulus=stiffness, volumetric_smoothing=smoothing, drainage="undrained"
+            ),
+        )
     shapes = [(aspect, skew, seed) for aspect in (0.3, 1.0, 3.0) for skew, seed in ((0.0, 0), (0.2, 0), (0.2, 1))]
     for (aspect, skew, seed), place, smoothing in itertools.product(shapes, ("layout", "vertices"), (True, False)):
         yield "mesh", Column(aspect=aspect, skew=skew, seed=seed, positions=place, volumetric_smoothing=smoothing)
@@ -105,10 +114,11 @@ def critical_map(chosen=None, progress=None):
     data = {
         name: ("configuration", np.array([row[name] for row in rows]), {"units": UNITS.get(name, "1")})
         for name in names
-        if name not in ("family", "positions")
+        if name not in ("family", "positions", "drainage")
     }
-    data["volumetric_smoothing"] = (data["volumetric_smoothing"][0], data["volumetric_smoothing"][1].astype(np.int8))
-    for name in ("family", "positions"):
+    for name in ("volumetric_smoothing", "remapping"):
+        data[name] = (data[name][0], data[name][1].astype(np.int8))
+    for name in ("family", "positions", "drainage"):
         data[name] = ("configuration", np.array([row[name] for row in rows], dtype=object))
     text = (
         "critical time step of a column of the solver: predicted by the program, and exact by its amplification matrix"

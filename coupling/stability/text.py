@@ -72,6 +72,9 @@ Numbers of this list are of trials made while this command was written; the tabl
   where it had not.
 - **A few points.** One point inside an element resists nothing until it meets a wall; the spectrum called any step
   stable. Beyond four times the step of the altitude the estimate is not believed, and half of that step is taken.
+- **Without remapping** (`remapping = false`) the critical step falls with the mass of the smallest node. Blocks and
+  gates run, with up to eight times the steps; a block that slides along a floor, whose corners touch floor nodes by
+  1e-6 of a point and less, would stand still. Its run ends with that reason.
 - **Steps of their own.** Forces held over the step of a coarse element act late at nodes with finer steps, and fed
   undamped waves; see [numerics.md](numerics.md).
 

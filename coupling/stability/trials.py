@@ -19,14 +19,14 @@ SOIL = {
     "cohesion": 0.0, "friction_angle": 25.0, "dilatancy_angle": 0.0, "tensile_strength": 0.0, "porosity": 0.45,
     "loose_porosity": 0.55, "grain_density": 2650.0, "hydraulic_conductivity": 1e-4, "k0": 0.577,
 }  # fmt: skip
-NUMERICS = ("courant", "pic_rate", "pressure_filter", "volumetric_smoothing")
+NUMERICS = ("courant", "pic_rate", "pressure_filter", "volumetric_smoothing", "remapping")
 
 
-def box_scene(size, bulk_modulus=8e7, gravity=9.81, table_depth=0.0, points=3, **settings):
+def box_scene(size, bulk_modulus=8e7, gravity=9.81, table_depth=0.0, points=3, drainage="two-phase", **settings):
     """Scene of a box of 12 by 8 cells of the given size [m]; other settings go to the soil or to [numerics]."""
     numerics = {k: settings.pop(k) for k in NUMERICS if k in settings}
     sizes = {f"element_size{part}": size for part in ("", "_lining", "_interior")}
-    water = {"table_depth": table_depth, "density": 1000.0, "bulk_modulus": bulk_modulus}
+    water = {"table_depth": table_depth, "density": 1000.0, "bulk_modulus": bulk_modulus, "drainage": drainage}
     return Scene.model_validate({
         "name": "box",
         "gravity": gravity,
@@ -115,16 +115,17 @@ def one_point(size=0.1, seconds=2.0, **settings):
 
 def coarse_tunnel(
     diameter=6.6, cover=1.0, width=0.2, angle=90.0, water=True, gravity=9.81, bulk_modulus=8e7, interior="resolved",
-    **soil,
+    remapping=True, drainage="two-phase", **soil,
 ):  # fmt: skip
     """Scene of one tunnel with a gate on the coarsest mesh that makes sense; `cover` in diameters."""
     box_width, depth = 5 * diameter, (cover + 2.5) * diameter
+    pore_water = {"table_depth": 0.0, "density": 1000.0, "bulk_modulus": bulk_modulus, "drainage": drainage}
     return Scene.model_validate({
         "name": "tunnel",
         "gravity": gravity,
         "interior": interior,
         "box": {"width": box_width, "depth": depth},
-        "water": {"table_depth": 0.0, "density": 1000.0, "bulk_modulus": bulk_modulus} if water else None,
+        "water": pore_water if water else None,
         "soils": [SOIL | soil],
         "tunnels": [{
             "x": 0.0, "cover": cover * diameter, "outer_diameter": diameter, "inner_diameter": 0.9 * diameter,
@@ -136,6 +137,7 @@ def coarse_tunnel(
             "element_size_interior": 0.08 * diameter, "elements_across_gate": 2, "gate_radius": 0.1 * diameter,
             "size_growth": 0.3,
         },
+        "numerics": {"remapping": remapping},
         "stop": {"time": 1.0},
         "output": {"interval": 1.0},
     })  # fmt: skip

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from coupling.provenance import origin, with_history
-from coupling.studies.design import Case, Study
+from coupling.studies.design import Case, Study, StudyError
 
 
 def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, str]):
@@ -22,6 +22,11 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
         (case) under their dotted names with `_` for `.`; `status` (case) "finished" or "failed", `message` (case);
         failed cases are NaN. Attributes: `study`, its definition as JSON with the seed; `failed`, their number; source,
         revision, versions.
+
+    Raises
+    ------
+    coupling.studies.design.StudyError
+        The file of a case is damaged.
     """
     import xarray as xr
 
@@ -30,8 +35,11 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     there = [case for case in cases if case_file(folder, case).is_file()]
     parts = []
     for case in there:
-        part = xr.open_dataset(case_file(folder, case), engine="h5netcdf", chunks={}, decode_timedelta=False)
-        parts.append(part)
+        file = case_file(folder, case)
+        try:
+            parts.append(xr.open_dataset(file, engine="h5netcdf", chunks={}, decode_timedelta=False))
+        except (OSError, RuntimeError, ValueError, KeyError) as error:
+            raise StudyError(unreadable(file, error)) from None
     if parts:
         result = xr.concat(
             parts, dim=xr.IndexVariable("case", [case.index for case in there]), join="outer", data_vars="all",
@@ -60,6 +68,11 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     return result
 
 
+def unreadable(file: Path, error: Exception) -> str:
+    """What to do about the damaged file of a case."""
+    return f"case '{file}': damaged ({type(error).__name__}); delete this file and repeat `gush study`"
+
+
 def _of_scenes(cases):
     """Coordinates that tell scenes apart where the scene itself is a parameter."""
     soils = [case.scene.mpm.soils[0] for case in cases]
@@ -85,9 +98,9 @@ def stored_cases(folder: str | Path) -> tuple[Study, list[Case], dict[str, str]]
     Raises
     ------
     coupling.studies.design.StudyError
-        No study there.
+        No study there, or its files are damaged.
     """
-    from coupling.studies.design import StudyError, cases, load_study
+    from coupling.studies.design import cases, load_study
     from coupling.studies.execute import STATUS_FILE, STUDY_FILE
 
     folder = Path(folder)
@@ -97,12 +110,19 @@ def stored_cases(folder: str | Path) -> tuple[Study, list[Case], dict[str, str]]
         raise StudyError(f"study folder '{folder}': must hold {STUDY_FILE}, got none; run gush study first") from None
     except ValueError as error:
         raise StudyError(f"study folder '{folder}': {STUDY_FILE} must be that of a study, got: {error}") from None
-    status = json.loads((folder / STATUS_FILE).read_text(encoding="utf-8")) if (folder / STATUS_FILE).is_file() else {}
     found = cases(plan)
+    try:
+        text = (folder / STATUS_FILE).read_text(encoding="utf-8") if (folder / STATUS_FILE).is_file() else "{}"
+        entries = {key: (e["parameters"], e["status"], str(e["message"])) for key, e in json.loads(text).items()}
+    except (ValueError, AttributeError, TypeError, KeyError):
+        raise StudyError(
+            f"study folder '{folder}': {STATUS_FILE} must be what `gush study` wrote, it is damaged; delete it and "
+            "repeat the command"
+        ) from None
     # the keys that the cases had when they ran: the sources may have changed since
-    if [entry["parameters"] for entry in status.values()] == [case.parameters for case in found]:
-        found = [replace(case, key=key) for case, key in zip(found, status, strict=True)]
-    return plan, found, {key: entry["message"] for key, entry in status.items() if entry["status"] == "failed"}
+    if [parameters for parameters, _, _ in entries.values()] == [case.parameters for case in found]:
+        found = [replace(case, key=key) for case, key in zip(found, entries, strict=True)]
+    return plan, found, {key: message for key, (_, status, message) in entries.items() if status == "failed"}
 
 
 def read_study(folder: str | Path):

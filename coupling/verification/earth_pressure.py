@@ -33,7 +33,7 @@ def load_path(solver, duration, nodes, component, speed):
 
 def wall(
     direction, cells, width, strain, friction_angle, dilatancy_angle, cohesion, rough_base, duration, points, courant,
-    pic_rate, smoothing,
+    pic_rate, smoothing, remapping,
 ):  # fmt: skip
     """Move a smooth wall of 1 m height away from (-1) or into (1) the soil.
 
@@ -48,7 +48,7 @@ def wall(
     }  # fmt: skip
     scene = dry_scene(
         "wall", size, columns * size, 1.0, soil, points=points, courant=courant, pic_rate=pic_rate,
-        volumetric_smoothing=smoothing,
+        volumetric_smoothing=smoothing, remapping=remapping,
     )  # fmt: skip
     solver = DrivenSolver(scene, mesh, damping=DAMPING)
     bottom = np.abs(mesh.nodes[:, 1] + 1.0) < 1e-9
@@ -67,23 +67,23 @@ def wall(
 
 def active_wall(
     cells=10, width=2.0, strain=4e-4, friction_angle=30.0, dilatancy_angle=0.0, cohesion=0.0, rough_base=False,
-    duration=0.5, points=3, courant=0.8, pic_rate=10.0, smoothing=True,
+    duration=0.5, points=3, courant=0.8, pic_rate=10.0, smoothing=True, remapping=True,
 ):  # fmt: skip
     """Active thrust."""
     return wall(
         -1, cells, width, strain, friction_angle, dilatancy_angle, cohesion, rough_base, duration, points, courant,
-        pic_rate, smoothing,
+        pic_rate, smoothing, remapping,
     )  # fmt: skip
 
 
 def passive_wall(
     cells=10, width=2.0, strain=1.5e-3, friction_angle=30.0, dilatancy_angle=0.0, cohesion=0.0, rough_base=False,
-    duration=0.5, points=3, courant=0.8, pic_rate=10.0, smoothing=True,
+    duration=0.5, points=3, courant=0.8, pic_rate=10.0, smoothing=True, remapping=True,
 ):  # fmt: skip
     """Passive resistance."""
     return wall(
         1, cells, width, strain, friction_angle, dilatancy_angle, cohesion, rough_base, duration, points, courant,
-        pic_rate, smoothing,
+        pic_rate, smoothing, remapping,
     )  # fmt: skip
 
 
@@ -97,7 +97,7 @@ def bearing_capacity_factor(friction_angle):
 
 def footing(
     cells=8, friction_angle=0.0, rough=True, settlement=0.0025, stiffness=20000.0, duration=0.25, points=3, courant=0.8,
-    pic_rate=10.0, smoothing=True,
+    pic_rate=10.0, smoothing=True, remapping=True,
 ):  # fmt: skip
     """Press half a strip footing into weightless soil: `cells` elements, 1 m, and half an element.
 
@@ -116,7 +116,7 @@ def footing(
     }  # fmt: skip
     scene = dry_scene(
         "footing", size, width, depth, soil, gravity=0.0, points=points, courant=courant, pic_rate=pic_rate,
-        volumetric_smoothing=smoothing,
+        volumetric_smoothing=smoothing, remapping=remapping,
     )  # fmt: skip
     solver = DrivenSolver(scene, mesh, damping=DAMPING)
     under = np.flatnonzero((np.abs(mesh.nodes[:, 1]) < 1e-9) & (mesh.nodes[:, 0] < 1 + 1e-9))
@@ -135,7 +135,8 @@ def footing(
 
 WALL_LADDER = {
     "cells": (5, 10, 20), "courant": (0.4, 0.8, 1.0), "points": (1, 3, 12), "pic_rate": (0.0, 10.0, 100.0),
-    "smoothing": (False, True), "friction_angle": (20.0, 30.0, 40.0), "dilatancy_angle": (0.0, 10.0, 30.0),
+    "smoothing": (False, True), "remapping": (False, True), "friction_angle": (20.0, 30.0, 40.0),
+    "dilatancy_angle": (0.0, 10.0, 30.0),
     "cohesion": (0.0, 2e3), "rough_base": (False, True),
 }  # fmt: skip
 WALL_NORM = "thrust over Rankine's less 1, mean over the last fifth of the path"
@@ -160,7 +161,7 @@ register(Problem(
     solve=footing, fast={"cells": 8},
     ladder={
         "cells": (2, 4, 8, 16), "courant": (0.4, 0.8, 1.0), "points": (1, 3, 12), "pic_rate": (0.0, 10.0, 100.0),
-        "smoothing": (False, True), "rough": (False, True),
+        "smoothing": (False, True), "remapping": (False, True), "rough": (False, True),
         "friction_angle": (0.0, 10.0, 20.0), "stiffness": (10000.0, 20000.0, 40000.0),
     },
     limit=0.05,

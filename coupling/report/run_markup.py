@@ -1,9 +1,9 @@
-"""The page as HTML: what can be read without a script, and the places that the script draws into."""
+"""The page about a run as HTML: what can be read without a script, and the places that the script draws into."""
 
-import json
 from html import escape
 
-MINUS = "\N{MINUS SIGN}"
+from coupling.report.frame import duration, figure, header, provenance, rows_of_facts, shown
+
 VERDICTS = {True: "as expected", False: "look at this", None: "–"}
 MODEL_QUESTION = "Lining models side by side"
 RING_CHARTS = (
@@ -16,104 +16,27 @@ RING_CHARTS = (
 )
 
 
-def document(data, style, script, mark):
-    """The whole page.
+def parts(data):
+    """Title and parts of the page for :func:`coupling.report.frame.document`.
 
-    Parameters
-    ----------
-    data : dict
-        From :func:`coupling.report.page.collect`.
-    style, script : str
-        Put in as they are.
-    mark : str
-        Meta element that tells a report from other pages.
-
-    Returns
-    -------
-    str
+    data : dict from :func:`coupling.report.run_page.collect`;  returns str, dict.
     """
-    attributes, player = data["attributes"], data["player"]
+    attributes, summary, player = data["attributes"], data["summary"], data["player"]
     title = f"Gushing into a tunnel: {attributes.get('scene_name', 'run')}"
-    # "<" would let a text of the scene end the script element
-    embedded = json.dumps(player, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    return f"""<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-{mark}
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'; \
-script-src 'unsafe-inline'; img-src data:">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{escape(title)}</title>
-<style>
-{style}</style>
-</head>
-<body>
-<a class="skip" href="#player">To the player</a>
-{_header(title, data)}
-<main>
-{_numbers(data["numbers"], data["summary"])}
-{_player(player)}
-{_quality(data)}
-{_scene(data)}
-</main>
-<footer>{_provenance(attributes)}</footer>
-<script type="application/json" id="data">{embedded}</script>
-<script>
-"use strict";
-(() => {{
-{script}
-}})();
-</script>
-</body>
-</html>
-"""
-
-
-def shown(value, unit=""):
-    """A number as people read it: three significant digits, whole from 100 on, a true minus sign (as in unpack.js)."""
-    if value is None:
-        return "–"
-    if value != 0 and (abs(value) >= 1e6 or abs(value) < 1e-4):
-        mantissa, power = f"{value:.2e}".split("e")
-        text = f"{mantissa}e{int(power)}"
-    elif abs(value) >= 100:
-        text = f"{value:.0f}"
-    else:
-        text = f"{float(f'{value:.3g}')!r}".removesuffix(".0")
-    return f"{text.replace('-', MINUS)} {unit}".strip()
-
-
-def _header(title, data):
-    summary, warned = data["summary"], data["warnings"]
     status = summary["status"]
-    messages = "".join(f"<li>{escape(text)}</li>" for text in warned)
-    notes = "".join(f"<li>{escape(text)}</li>" for text in data["notes"])
-    warned_block = (
-        f'<section class="warnings" aria-labelledby="warnings"><h2 id="warnings">Warnings</h2>'
-        f"<ul>{messages}</ul></section>"
-        if warned
-        else '<p class="fine">No warnings.</p>'
-    )
-    return f"""<header>
-<h1>{escape(title)}</h1>
-<p class="lead">{escape(_lead(summary))}
-<span class="status {escape(status)}">{escape(status)}</span></p>
-{warned_block}
-{f'<ul class="notes">{notes}</ul>' if notes else ""}
-</header>"""
+    sections = (_numbers(data["numbers"], summary), _player(player), _quality(data), _scene(data))
+    return title, {
+        "skip": ("player", "To the player"),
+        "header": header(title, _lead(summary), (status, status), data["warnings"], data["notes"]),
+        "main": "\n".join(sections),
+        "footer": provenance(attributes, f"run of {attributes.get('created', 'unknown time')}"),
+    }
 
 
 def _lead(summary):
     wall = summary.get("wall_seconds")
-    cost = "" if wall is None else f", computed in {_duration(wall)}"
+    cost = "" if wall is None else f", computed in {duration(wall)}"
     return f"{shown(summary['inflow_mass'])} kg of grains per metre in {shown(summary['time'])} s{cost}."
-
-
-def _duration(seconds):
-    return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min" if seconds < 7200 else (
-        f"{seconds / 3600:.1f} h"
-    )  # fmt: skip
 
 
 def _numbers(groups, summary):
@@ -159,19 +82,6 @@ def _number_row(n, with_start, with_basis):
     )
 
 
-def _figure(key, title, unit, kind, extra=""):
-    unit_text = f' <span class="unit">[{escape(unit)}]</span>' if unit else ""
-    place = (
-        f'<canvas id="{key}" width="900" height="900" role="img" aria-label="{escape(title)}"></canvas>'
-        if kind == "canvas"
-        else f'<svg id="{key}" role="img" aria-label="{escape(title)}"></svg>'
-    )
-    return (
-        f'<figure data-chart="{key}"><h3>{escape(title)}{unit_text}</h3>{extra}{place}'
-        f'<figcaption id="{key}-text"></figcaption></figure>'
-    )
-
-
 def _player(player):
     parts, lining, models = [], player["lining"], player["models"]
     if player["fields"]:
@@ -182,15 +92,15 @@ def _player(player):
             '<label>View <select id="field-view"><option value="tunnel">around the tunnel</option>'
             '<option value="gate">at the gap</option></select></label></div>'
         )
-        parts.append(_figure("fields", "Ground around the tunnel", "", "canvas", tools))
-    parts.append(_figure("inflow_mass", "Inflow mass", "kg/m", "svg"))
-    parts.append(_figure("zones", "Flow zone and disturbed zone", "m²", "svg"))
+        parts.append(figure("fields", "Ground around the tunnel", "", "canvas", tools))
+    parts.append(figure("inflow_mass", "Inflow mass", "kg/m", "svg"))
+    parts.append(figure("zones", "Flow zone and disturbed zone", "m²", "svg"))
     if lining:
-        parts += [_figure(key, title, unit, "svg") for key, title, unit in RING_CHARTS[:3]]
+        parts += [figure(key, title, unit, "svg") for key, title, unit in RING_CHARTS[:3]]
     if models:
-        parts += [_figure(key, title, unit, "svg") for key, title, unit in RING_CHARTS[3:]]
-        parts.append(_figure("deformed", "Deformed ring", "", "svg"))
-        parts.append(_figure("convergence", "Convergence and settlement", "mm", "svg"))
+        parts += [figure(key, title, unit, "svg") for key, title, unit in RING_CHARTS[3:]]
+        parts.append(figure("deformed", "Deformed ring", "", "svg"))
+        parts.append(figure("convergence", "Convergence and settlement", "mm", "svg"))
     tables = ""
     if any(model["joints"] for model in models):
         tables += (
@@ -212,8 +122,8 @@ def _player(player):
 space plays.</p>
 <div class="bar">
 <button id="play" type="button" aria-pressed="false">Play</button>
-<label class="slider"><span class="hidden">Time</span><input id="time" type="range" min="0" step="1"></label>
-<output id="now" for="time"></output>
+<label class="slider"><span class="hidden">Time</span><input id="slider" type="range" min="0" step="1"></label>
+<output id="now" for="slider"></output>
 </div>
 <div class="tools"><label>Ring charts <select id="shape"><option value="polar">around the ring</option>
 <option value="unrolled">unrolled over the angle</option></select></label>{tunnel}</div>
@@ -238,7 +148,6 @@ def _quality(data):
 
 
 def _scene(data):
-    facts = "".join(f'<tr><th scope="row">{escape(a)}</th><td>{escape(b)}</td></tr>' for a, b in data["facts"])
     parts = "".join(
         f'<tr class="{"on" if row["active"] else "off"}"><th scope="row">{escape(row["feature"])}</th>'
         f"<td>{'computed' if row['active'] else 'left out'}</td><td>{escape(row['reason'])}</td></tr>"
@@ -255,13 +164,13 @@ def _scene(data):
             '<div class="tools"><label>View <select id="mesh-view"><option value="tunnel">around the tunnel</option>'
             '<option value="gate">at the gap</option><option value="box">whole box</option></select></label></div>'
         )
-        mesh_figure = _figure("mesh", "Mesh", "", "canvas", tools)
+        mesh_figure = figure("mesh", "Mesh", "", "canvas", tools)
     return f"""<section aria-labelledby="scene">
 <h2 id="scene">Scene and mesh</h2>
-<div class="grid wide">{_figure("section", "Section through the ground", "", "svg")}{mesh_figure}</div>
+<div class="grid wide">{figure("section", "Section through the ground", "", "svg")}{mesh_figure}</div>
 <p id="mesh-facts">{mesh_text}</p>
 <div class="scroll" role="region" aria-labelledby="scene" tabindex="0">
-<table class="facts"><tbody>{facts}</tbody></table></div>
+<table class="facts"><tbody>{rows_of_facts(data["facts"])}</tbody></table></div>
 <h3 id="parts">What was computed and what was left out</h3>
 <div class="scroll" role="region" aria-labelledby="parts" tabindex="0"><table>
 <thead><tr><th scope="col">part</th><th scope="col"></th><th scope="col">why</th></tr></thead>
@@ -269,9 +178,3 @@ def _scene(data):
 <details><summary>The complete scene, as the program reads it</summary>
 <pre tabindex="0">{escape(str(data["attributes"].get("scene", "")))}</pre></details>
 </section>"""
-
-
-def _provenance(attributes):
-    parts = [attributes.get("source", ""), f"revision {attributes['revision']}" if attributes.get("revision") else "",
-             f"run of {attributes.get('created', 'unknown time')}", attributes.get("versions", "")]  # fmt: skip
-    return escape(" · ".join(part for part in parts if part))

@@ -1,0 +1,81 @@
+"""What the page about a run shows, collected from its datasets."""
+
+from coupling.datasets import RunFileError, read_run, run_file
+from coupling.report.fields import field_snapshots, mesh_picture
+from coupling.report.numbers import key_numbers, quality, warnings
+from coupling.report.packing import packed
+from coupling.report.scene_facts import facts, left_out, read_scene, section
+from coupling.report.series import choose_frames, history_series, lining_series, model_names, model_series
+from coupling.summary import summarise_run
+
+SCRIPTS = (
+    "unpack.js", "run_data.js", "charts.js", "tables.js", "slider.js", "ring_views.js", "history_views.js",
+    "field_views.js", "run_player.js",
+)  # fmt: skip
+
+
+def collect(run):
+    """Everything that the page shows.
+
+    Returns
+    -------
+    dict
+        attributes, summary, numbers, quality, warnings, notes, facts, left_out: for the text; player: what the script
+        draws, JSON.
+    """
+    tree = read_run(run)
+    attributes = {name: _plain(value) for name, value in tree.attrs.items()}
+    if "history" not in tree.children or "lining" not in tree.children:
+        raise RunFileError(f"run file '{run_file(run)}': it holds no run; give the folder that `gush run` wrote")
+    if not min(tree["lining"].sizes["time"], tree["history"].sizes["time"]):
+        raise RunFileError(f"run file '{run_file(run)}': has no complete record yet; wait for the first one")
+    scene, summary = read_scene(attributes), summarise_run(run)
+    quality_rows = quality(tree, summary, scene)
+    frames = choose_frames(tree)
+    fields = field_snapshots(tree["points"].to_dataset()) if "points" in tree.children else None
+    return {
+        "attributes": attributes,
+        "summary": summary,
+        "numbers": key_numbers(tree),
+        "quality": quality_rows,
+        "warnings": warnings(tree, attributes, quality_rows),
+        "notes": _thinned(tree, frames, fields, scene),
+        "facts": [] if scene is None else facts(scene),
+        "left_out": [] if scene is None else left_out(scene),
+        "player": _player(tree, scene, frames, fields),
+    }
+
+
+def _player(tree, scene, frames, fields):
+    lining = tree["lining"].to_dataset()
+    times = lining["time"].values[frames]
+    return {
+        "time": packed(times),
+        "inflow_mass": packed(lining["inflow_mass"].values[frames]),
+        "section": section(scene, lining.attrs),
+        "lining": lining_series(tree, frames),
+        "models": [model_series(name, tree[f"structure/{name}"].to_dataset(), times) for name in model_names(tree)],
+        "history": history_series(tree),
+        "mesh": mesh_picture(tree["mesh"].to_dataset()) if "mesh" in tree.children else None,
+        "fields": fields,
+    }
+
+
+def _thinned(tree, frames, fields, scene):
+    """What the page leaves out of the datasets, as sentences."""
+    told, records = [], tree["lining"].sizes["time"]
+    if len(frames) < records:
+        told.append(f"The slider stops at {len(frames)} of {records} records; run.nc holds them all.")
+    if fields is not None:
+        shown, shares = len(fields["snapshots"]), [s["drawn"] / max(s["present"], 1) for s in fields["snapshots"]]
+        if shown < fields["available"]:
+            told.append(f"The fields are shown at {shown} of {fields['available']} stored times.")
+        if min(shares) < 1:
+            told.append(f"The fields show {min(shares):.0%} of the points in view, drawn larger.")
+    if scene is None:
+        told.append("This version of the program does not understand the run's scene; only its text is shown.")
+    return told
+
+
+def _plain(value):
+    return value.item() if hasattr(value, "item") and getattr(value, "size", 1) == 1 else value
