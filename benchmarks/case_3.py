@@ -29,11 +29,12 @@ from coupling.datasets import (
 )
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
+SETTLING = 3.0  # s
 PICTURES = ("fields", "pressures", "internal_forces", "inflow")
 
 WHY_NOT = (
-    "Within two metres of the gate the pressure falls to zero over three or four elements, so neighbours differ by a",
-    "third of the local value whatever the method; what they lie off the plane through their neighbours is the noise.",
+    "Within two metres of the gate the pressure falls over a few elements, so neighbours differ by a tenth of the",
+    "local value and more whatever the method; what they lie off the plane through their neighbours is the noise.",
     "",
 )
 BESIDE = (
@@ -78,11 +79,13 @@ def measured(folder):
     mass = history["grain_mass"].values
     lost = float(np.abs(mass / mass[0] - 1).max())
     row("grain_mass_error", "grain mass conserved", "1e-10", lost, lost <= 1e-10, f"{lost:.1e}")
-    beside = [gate - 5, gate + 5]
+    width = np.degrees(scene.mpm.gate.width / scene.mpm.tunnels[0].outer_radius)  # beside: that far from its middle
     for name in ("soil_pressure", "water_pressure"):
-        ratio = postprocess.ratio_to_initial(pressures, name, 1000, beside)
-        row(f"{name}_beside_gate", f"{name.replace('_', ' ')} 5 degrees beside the gate at 1000 kg/m over initial",
-            "< 1/3", ratio, ratio < 1 / 3, f"{ratio:.2f}")  # fmt: skip
+        ratio, further = (
+            postprocess.ratio_to_initial(pressures, name, 1000, [gate - a, gate + a]) for a in (width, 5.0)
+        )
+        row(f"{name}_beside_gate", f"{name.replace('_', ' ')} one gate width from its middle at 1000 kg/m over initial",
+            "< 1/3", ratio, ratio < 1 / 3, f"{ratio:.2f}; at 5 degrees {further:.2f}")  # fmt: skip
     for angle, where in ((0, "crown"), (180, "invert")):
         ratio = postprocess.ratio_to_initial(pressures, "soil_pressure", 1000, [angle])
         row(f"soil_pressure_{where}", f"soil pressure at the {where} at 1000 kg/m over initial", "> 1", ratio,
@@ -94,11 +97,34 @@ def measured(folder):
         f"{early * 1000:.0f}, {rapid * 1000:.0f}, {late * 1000:.0f} m2 per 1000 kg/m "
         f"(to 500, 500 .. 1000, 1500 .. 2000 kg/m)")  # fmt: skip
     _smoothness(row, folder, mesh)
-    resting = postprocess.heap(read_points(folder, -1), mesh)
+    stirred, resting = postprocess.heap(read_points(folder, -1), mesh), _settled_heap(scene.mpm, mesh)
     met = bool(0.4 <= resting["porosity"] <= 0.6)
-    text = f"{resting['porosity']:.2f} over {resting['area']:.2f} m2; median speed {resting['speed']:.2f} m/s"
-    row("heap_porosity", "porosity of the heap in the tunnel, by area", "0.4 .. 0.6", resting["porosity"], met, text)
+    text = (
+        f"{resting['porosity']:.2f} over {resting['area']:.2f} m2; median speed {resting['speed']:.2f} m/s; at the end "
+        f"of the run, where the jet stirs it, {stirred['porosity']:.2f} and {stirred['speed']:.2f} m/s"
+    )
+    what = f"porosity of the heap in the tunnel, by area, {SETTLING:g} s after the gate was shut at 1000 kg/m"
+    row("heap_porosity", what, "0.4 .. 0.6", resting["porosity"], met, text)  # fmt: skip
     return rows, data
+
+
+def _settled_heap(scene, mesh):
+    """The heap of 1000 kg/m some time after the gate was shut: what the jet stirs does not rest."""
+    import xarray as xr
+
+    import mpm
+
+    simulation = mpm.Simulation(scene.model_copy(update={"stop": mpm.scene.Stop(inflow_mass=1000.0, time=60.0)}))
+    simulation.begin()
+    while not simulation.done:
+        simulation.advance()
+    solver = simulation.solver
+    solver.close_gate()
+    end = solver.time + SETTLING
+    while solver.time < end:
+        solver.step(end - solver.time)
+    points = {name: ("point", values) for name, values in solver.points_by_name().items()}
+    return postprocess.heap(xr.Dataset(points), mesh)
 
 
 def _smoothness(row, folder, mesh):
