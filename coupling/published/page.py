@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -105,7 +106,8 @@ def write_page(folder: str | Path, out: str | Path) -> dict:
             _row(answer.statement, answer.published, answer.ours, _word(answer.agrees), answer.rule) for answer in rows
         ]
         lines.append("")
-    lines += _cases_table(study, case.half, case.masses[-1])
+    lines += [_belief(), ""]
+    lines += _cases_table(study, runs, case.half, case.masses[-1])
     if sensitivity is not None:
         lines += sensitivity_section(sensitivity.load(), images)
     lines += ["## Figures", "", "Numbered as in the published study.", ""]
@@ -154,8 +156,8 @@ def sensitivity_section(study, images: Path) -> list[str]:
     return lines
 
 
-def _cases_table(study, *masses):
-    """Largest forces of all cases at some inflow masses, both lining models."""
+def _cases_table(study, runs, *masses):
+    """Largest forces of all cases at some inflow masses, both lining models; else how far a case came."""
     lines = ["## Cases", ""]
     for mass in masses:
         now = at_study_inflow(study, mass)
@@ -174,10 +176,17 @@ def _cases_table(study, *masses):
                                        ("bending_moment", np.min)):  # fmt: skip
                     before, after = (float(pick(state[variable].values)) / 1e3 for state in (first, one))
                     cells.append(f"{after:.0f} ({before:.0f})" if np.isfinite(after) else f"not reached ({before:.0f})")
-                time = float(now["time"].isel(case=k))
-                lines.append(f"| {name} | {about} | {model} | {' | '.join(cells)} | {time:.3g} |")
+                time = f"{float(now['time'].isel(case=k)):.3g}"
+                if runs[k] is not None and runs[k].last_mass < mass:
+                    time = f"ended at {runs[k].last_mass:.0f} kg/m"
+                lines.append(f"| {name} | {about} | {model} | {' | '.join(cells)} | {time} |")
         lines.append("")
     return lines
+
+
+def _belief():
+    """What we make of the differences, in words."""
+    return (resources.files("coupling") / "published" / "belief.md").read_text(encoding="utf-8").rstrip()
 
 
 def _verdict(answers):
