@@ -2,7 +2,7 @@
 
 _HOME = {
     "Record": "simulation", "simulate": "simulation", "Simulation": "simulation", "RunFailed": "solver",
-    "Solver": "solver", "Scene": "scene", "Mesh": "mesh", "build_mesh": "mesh",
+    "Solver": "solver", "Scene": "scene", "Mesh": "mesh", "build_mesh": "meshing",
 }  # fmt: skip
 __all__ = sorted(_HOME)
 

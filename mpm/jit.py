@@ -30,7 +30,7 @@ def kernel(function, **options):
 
 
 def kernel_part(function):
-    """A kernel that only other kernels call: no machine code of its own, and nothing to keep."""
+    """A kernel that only other kernels call: without machine code of its own: Python may not call it."""
     return _compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mpm.mesh import build_mesh
+from mpm.meshing import build_mesh
 from mpm.solver import RunFailed, Solver
 from mpm.state import restore_solver, solver_state
 from mpm.variables import CLAMPS

@@ -3,7 +3,6 @@
 import math
 import os
 from concurrent.futures import ThreadPoolExecutor, wait
-from types import SimpleNamespace
 
 import numpy as np
 
@@ -17,7 +16,8 @@ from mpm.contact import (
     solve_nodes,
     solve_undrained_nodes,
 )
-from mpm.half_model import right_half, ring_factors, whole_ring, with_mirrored_points
+from mpm.contact_nodes import contact_nodes
+from mpm.half_model import right_half, with_mirrored_points
 from mpm.levels import element_levels, sorted_by_level, tie
 from mpm.long_step import (
     ACTIVE,
@@ -43,6 +43,7 @@ from mpm.long_step import (
 from mpm.meeting import meeting_width
 from mpm.points import cut_by_points, fill, initial_stress, relocate_kernel, sort_by_element
 from mpm.spectrum import spectral_time_step
+from mpm.tables import element_geometry, element_neighbours, outflow_nodes, soil_table
 from mpm.time_step import critical_time_step, dry_wave_speed, fast_wave_speed
 from mpm.transfer import advance_kernel, rates_kernel, update_kernel
 from mpm.variables import (
@@ -50,8 +51,6 @@ from mpm.variables import (
     CLAMPS,
     LEDGER,
     MASS,
-    MODEL_ELASTIC,
-    MODEL_MOHR_COULOMB,
     NODAL_MEANS,
     NODAL_MOMENTA,
     NODE_WIDTH,
@@ -59,7 +58,6 @@ from mpm.variables import (
     RATE_WIDTH,
     S_G,
     S_LAMBDA,
-    SOIL_WIDTH,
     V_P,
     VLX,
     VLY,
@@ -216,102 +214,25 @@ class Solver:
 
     def _build_contact(self):
         mesh, scene = self.mesh, self.scene
-        node, closed, opened, active_closed, active_open, friction = [], [], [], [], [], []
-        lining = []
-        corner_angle = {}
-        opening = set(mesh.opening_nodes.tolist()) if scene.gate is not None else set()
-        corners = mesh.corner_nodes.tolist() if scene.gate is not None else []
-        if scene.gate is not None:
-            a = math.radians(scene.gate.angle)
-            tangent = np.array([math.cos(a), -math.sin(a)])
-            # the corner on the smaller-angle side bounds the channel from below in angle
-            corner_angle = {i: side * tangent for i, side in zip(corners, mesh.corner_side.tolist(), strict=True)}
-        for t, tunnel in enumerate(scene.tunnels):
-            axis = np.array([tunnel.x, -tunnel.axis_depth])
-            outer = mesh.outer_nodes[t]
-            first = len(node)
-            for i, outward in zip(outer, self._balanced_normals(outer), strict=True):
-                node.append(i)
-                closed.append(outward)
-                opened.append(corner_angle.get(int(i), outward))
-                active_closed.append(True)
-                active_open.append(int(i) not in opening)
-                friction.append(tunnel.friction_coefficient)
-            theta, ring = mesh.outer_theta[t], self._ring(outer)
-            rows, factors = np.arange(first, len(node)), np.ones((1, 5))
-            if scene.is_half:
-                place = whole_ring(len(outer))
-                outer, rows, factors = outer[place], rows[place], ring_factors(len(outer))
-                theta = np.where(np.arange(len(place)) < len(theta), theta[place], 360.0 - theta[place])
-            edge = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
-            arc = 0.5 * (edge + np.roll(edge, 1))
-            bears_open = np.array([int(i) not in opening and int(i) not in corners for i in outer])
-            lining.append(SimpleNamespace(theta=theta, arc=arc, rows=rows, factors=factors, bears=bears_open))
-        if scene.gate is not None:
-            tunnel = scene.tunnels[scene.gate.tunnel]
-            axis = np.array([tunnel.x, -tunnel.axis_depth])
-            for i, side in zip(mesh.wall_nodes, mesh.wall_side, strict=True):
-                node.append(i)
-                closed.append(side * tangent)
-                opened.append(side * tangent)
-            for i in mesh.inner_nodes:
-                inward = (axis - mesh.nodes[i]) / np.linalg.norm(mesh.nodes[i] - axis)
-                node.append(i)
-                closed.append(inward)
-                opened.append(inward)
-            rest = len(node) - len(active_closed)
-            active_closed += [True] * rest
-            active_open += [True] * rest
-            friction += [tunnel.friction_coefficient] * rest
+        contact = contact_nodes(scene, mesh)
+        self.n_contact = len(contact.node)
         self.contact_of_node = np.full(len(mesh.nodes), -1, np.int32)
-        self.contact_of_node[np.array(node, int)] = np.arange(len(node), dtype=np.int32)
-        self.n_contact = len(node)
-        self.normal = np.array(closed, float).reshape(-1, 2)
-        self._normal_open = np.array(opened, float).reshape(-1, 2)
-        self.active = np.array(active_closed, np.int8)
-        self._active_open = np.array(active_open, np.int8)
+        self.contact_of_node[contact.node] = np.arange(self.n_contact, dtype=np.int32)
+        self.normal, self._normal_open = contact.normal, contact.normal_open
+        self.active, self._active_open = contact.active, contact.active_open
         self._closed = self.normal, self.active
-        self.friction = np.array(friction, float)
-        self.lining = lining
-        on_mirror_line = np.isin(np.array(node, int), self.mirror_line)
+        self.friction, self.lining = contact.friction, contact.lining
+        on_mirror_line = np.isin(contact.node, self.mirror_line)
         for normal in (self.normal, self._normal_open):
             normal[on_mirror_line, 0] = 0.0
-        self.impulse = np.zeros((len(node), 5))
-        rows = [part.rows for part in lining]
-        if scene.gate is not None:
-            rows[scene.gate.tunnel] = np.r_[rows[scene.gate.tunnel], len(node) - rest : len(node)]
+        self.impulse = np.zeros((self.n_contact, 5))
         self.moving, self.wall = None, None  # compiles the motion of the walls out
         self.lining_displacement = self.lining_velocity = self.lining_impulse = np.zeros(0)
         if any(scene.lining_of(tunnel) != "fixed" for tunnel in scene.tunnels):
-            self.moving = moving = MovingLinings(scene, mesh, self.contact_of_node, rows)
+            self.moving = moving = MovingLinings(scene, mesh, self.contact_of_node, contact.moved_by)
             self.wall = moving.wall
             self.lining_displacement, self.lining_velocity = moving.displacement, moving.velocity
             self.lining_impulse = moving.left
-
-    def _ring(self, outer):
-        """Positions of all nodes of a ring, clockwise: those of a half model and their mirror images [m]."""
-        position = self.mesh.nodes[outer]
-        if not self.scene.is_half:
-            return position
-        place = whole_ring(len(outer))
-        image = np.arange(len(place)) >= len(outer)
-        return position[place] * np.column_stack([np.where(image, -1.0, 1.0), np.ones(len(place))])
-
-    def _balanced_normals(self, outer):
-        """Normals of the outer face along the resultant of the hydrostatic pressure at each node.
-
-        On a polygon the resultant of a pressure on the two edges of a node is not radial. A wall
-        that can only push along the radius would let still water creep along it.
-        """
-        position = self._ring(outer)
-        _, pressure = initial_stress(self.scene, -position[:, 1])
-        pressure = np.maximum(pressure, 1.0)  # above the water table: as for a uniform pressure
-        edge = np.roll(position, -1, axis=0) - position  # clockwise to the next node
-        outward = np.column_stack([-edge[:, 1], edge[:, 0]])
-        after = np.roll(pressure, -1)
-        force = outward * (2 * pressure + after)[:, None]
-        force += np.roll(outward * (pressure + 2 * after)[:, None], 1, axis=0)
-        return (force / np.linalg.norm(force, axis=1)[:, None])[: len(outer)]
 
     def _volumes(self):
         rho = np.array([s.grain_density for s in self.scene.soils])[self.soil_of_point]
@@ -703,69 +624,3 @@ def _cut_evenly(cuts):
 def _last_multiples(periods, numbers):
     """For each number the coarsest level whose period divides it, as all shorter ones then do: (n,) int64."""
     return (numbers[:, None] % periods == 0).sum(axis=1) - 1
-
-
-def soil_table(scene):
-    """Parameters of the soils as the kernels read them: (n_soils, 13) float64."""
-    table = np.zeros((len(scene.soils), SOIL_WIDTH))
-    for row, soil in zip(table, scene.soils, strict=True):
-        shear = soil.youngs_modulus / (2 * (1 + soil.poissons_ratio))
-        lam = 2 * shear * soil.poissons_ratio / (1 - 2 * soil.poissons_ratio)
-        phi, psi = math.radians(soil.friction_angle), math.radians(soil.dilatancy_angle)
-        apex = soil.cohesion / math.tan(phi) if phi > 0 else math.inf
-        row[:] = (
-            MODEL_ELASTIC if soil.model == "elastic" else MODEL_MOHR_COULOMB,
-            lam,
-            shear,
-            lam + 2 * shear / 3,
-            soil.cohesion * math.cos(phi),
-            math.sin(phi),
-            math.sin(psi),
-            apex,
-            min(soil.tensile_strength, apex),
-            soil.loose_porosity,
-            soil.porosity,
-            scene.gravity / soil.hydraulic_conductivity if scene.is_two_phase else 0.0,
-            soil.grain_density,
-        )
-    return table
-
-
-def element_geometry(mesh):
-    """Gradients, first corner, area and smallest altitude of every element: (n_elements, 8) float64."""
-    c = mesh.nodes[mesh.elements]
-    e1, e2 = c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]
-    det = e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]
-    longest = np.max([np.linalg.norm(v, axis=1) for v in (e1, e2, e2 - e1)], axis=0)
-    columns = [e2[:, 1] / det, -e2[:, 0] / det, -e1[:, 1] / det, e1[:, 0] / det, c[:, 0, 0], c[:, 0, 1], det / 2]
-    return np.ascontiguousarray(np.stack([*columns, det / longest], axis=1))
-
-
-def outflow_nodes(scene, mesh):
-    """Nodes at the inner end of the channel where a sink takes material out; none for a resolved interior."""
-    if scene.gate is None or scene.interior != "sink":
-        return np.zeros(0, int)
-    tunnel = scene.tunnels[scene.gate.tunnel]
-    radius = np.hypot(mesh.nodes[:, 0] - tunnel.x, mesh.nodes[:, 1] + tunnel.axis_depth)
-    return np.flatnonzero(radius < tunnel.inner_radius * (1 + 1e-9))
-
-
-def element_neighbours(mesh, outflow):
-    """Element across the edge opposite each corner: (n_elements, 3) int32; -1 at a wall, -2 at an outflow."""
-    edges = {}
-    neighbours = np.full((len(mesh.elements), 3), -1, np.int32)
-    for e, corner in enumerate(mesh.elements.tolist()):
-        for k in range(3):
-            a, b = corner[(k + 1) % 3], corner[(k + 2) % 3]
-            key = (a, b) if a < b else (b, a)
-            other = edges.pop(key, None)
-            if other is None:
-                edges[key] = (e, k)
-            else:
-                neighbours[e, k] = other[0]
-                neighbours[other] = e
-    outflow = set(outflow.tolist())
-    for (a, b), (e, k) in edges.items():
-        if a in outflow and b in outflow:
-            neighbours[e, k] = -2
-    return neighbours

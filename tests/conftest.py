@@ -3,7 +3,8 @@
 import pytest
 
 import coupling
-from mpm.mesh import Mesh, build_mesh
+from mpm.mesh import Mesh
+from mpm.meshing import build_mesh
 
 
 @pytest.fixture(scope="session")

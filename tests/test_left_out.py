@@ -1,5 +1,6 @@
 """What a scene does not need is not computed; where the feature is there but neutral, the answer is the same."""
 
+import numba
 import numpy as np
 import pytest
 from small_event import small_scene
@@ -202,7 +203,7 @@ def test_wall_pushes_an_undrained_mixture_as_two_tied_phases():
         if mixed:
             given[0, :, [B_PSX, B_PSY]] = speed * (sums[0, :, B_MS] + sums[0, :, B_MN])
         nodes, impulse, ledger = np.zeros((n, NODE_WIDTH)), np.zeros((n, 5)), np.zeros(len(LEDGER))
-        solve(
+        numba.njit(error_model="numpy")(solve.py_func)(  # a kernel's part has no code of its own to call
             0, n, row, np.full(n, -1, np.int32), np.zeros(n, np.int8), 0, np.array([1e-3]), given, np.zeros((0, 6)),
             9.81, 1000.0, np.zeros(n, np.int8), row, normal, np.ones(n, np.int8), np.full(n, 0.2), None, nodes,
             np.zeros(n, np.int8), impulse, ledger,

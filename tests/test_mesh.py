@@ -10,8 +10,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import coupling
-from mpm import mesh as meshing
-from mpm.mesh import CHANNEL, HEADROOM, INTERIOR, SOIL, Mesh, MeshError, build_mesh
+from mpm.element_size import element_size
+from mpm.mesh import CHANNEL, HEADROOM, INTERIOR, SOIL, Mesh, MeshError, altitudes, angles, areas
+from mpm.meshing import build_mesh
 from mpm.scene import Scene
 
 # Coordinates up to 60 m in double precision: a few units in the last place.
@@ -50,7 +51,7 @@ def same(a, b) -> bool:
 
 def test_triangles_are_counter_clockwise_and_fill_every_region(quick_scene, quick_mesh):
     scene, mesh = quick_scene.mpm, quick_mesh
-    area = meshing.areas(mesh.nodes, mesh.elements)
+    area = areas(mesh.nodes, mesh.elements)
     assert area.min() > 0
     by_region = {region: area[mesh.region == region].sum() for region in (SOIL, CHANNEL, INTERIOR, HEADROOM)}
     box = scene.box
@@ -128,12 +129,12 @@ def test_size_at_the_gate_follows_the_elements_across_and_grows_linearly(quick_s
     scene = quick_scene.mpm
     tunnel, d = scene.tunnels[0], scene.discretisation
     at_gate = scene.gate.width / d.elements_across_gate
-    size = meshing.element_size(scene, tunnel.x + tunnel.outer_radius + np.array([0.0, 1.0, 40.0]), -tunnel.axis_depth)
+    size = element_size(scene, tunnel.x + tunnel.outer_radius + np.array([0.0, 1.0, 40.0]), -tunnel.axis_depth)
     np.testing.assert_allclose(size, [at_gate, at_gate + d.size_growth, d.element_size])
 
 
 def test_quality_reports_the_smallest_altitude(quick_mesh):
-    altitude = meshing.altitudes(quick_mesh.nodes, quick_mesh.elements)
+    altitude = altitudes(quick_mesh.nodes, quick_mesh.elements)
     quality = quick_mesh.quality
     assert quality["min_altitude"] == altitude.min()
     assert (quality["n_nodes"], quality["n_elements"]) == (len(quick_mesh.nodes), len(quick_mesh.elements))
@@ -142,8 +143,8 @@ def test_quality_reports_the_smallest_altitude(quick_mesh):
 
 def test_altitude_of_a_right_triangle():
     nodes, elements = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 4.0]]), np.array([[0, 1, 2]])
-    assert meshing.altitudes(nodes, elements) == pytest.approx([12 / 5])
-    np.testing.assert_allclose(np.sort(np.degrees(meshing.angles(nodes, elements)[0]))[-1], 90)
+    assert altitudes(nodes, elements) == pytest.approx([12 / 5])
+    np.testing.assert_allclose(np.sort(np.degrees(angles(nodes, elements)[0]))[-1], 90)
 
 
 def test_mesh_twice_is_the_same_bit_for_bit(quick_scene, quick_mesh):
@@ -154,9 +155,7 @@ def test_mesh_twice_is_the_same_bit_for_bit(quick_scene, quick_mesh):
 def test_mirrored_mesh_is_the_mesh_seen_from_behind(quick_scene, quick_mesh):
     mesh, mirror = quick_mesh, quick_mesh.mirrored()
     np.testing.assert_array_equal(mirror.nodes, mesh.nodes * [-1, 1])
-    np.testing.assert_array_equal(
-        meshing.areas(mirror.nodes, mirror.elements), meshing.areas(mesh.nodes, mesh.elements)
-    )
+    np.testing.assert_array_equal(areas(mirror.nodes, mirror.elements), areas(mesh.nodes, mesh.elements))
     assert mirror.gate_angle == 360 - mesh.gate_angle
     assert np.all(mirror.nodes[mirror.left, 0] == mirror.nodes[:, 0].min())
     tunnel = quick_scene.mpm.tunnels[0]
@@ -217,7 +216,7 @@ def test_without_gate_there_is_neither_channel_nor_interior(quick_scene):
 
 def test_level_ground_without_tunnels_is_a_rectangle(quick_scene):
     mesh = build_mesh(changed(quick_scene.mpm, gate=None, tunnels=(), stop={"time": 1.0}))
-    area = meshing.areas(mesh.nodes, mesh.elements)
+    area = areas(mesh.nodes, mesh.elements)
     assert area[mesh.region == SOIL].sum() == pytest.approx(100.0 * 50.0, rel=ROUND_OFF)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from coupling.stability.extremes import follow
 from coupling.stability.monitor import Monitor
 from coupling.verification.boxes import box_mesh
-from mpm.mesh import build_mesh
+from mpm.meshing import build_mesh
 from mpm.scene import Scene
 from mpm.solver import Solver
 from mpm.variables import MASS, SXX, SXY, SYY, SZZ, V_P, VLX, VSX, N, P, X, Y

@@ -132,7 +132,7 @@ def hydrostatics(
     largest modulus allowed: it has no reason to move either, but for an ovalisation that changes pressures by 0.1 %.
     """
     import coupling
-    from mpm.mesh import build_mesh
+    from mpm.meshing import build_mesh
 
     rough = {"x": 0.0, "cover": 20.0, "outer_diameter": 6.6, "inner_diameter": 5.9, "friction_coefficient": 2.0}
     if lining != "fixed":

@@ -1,0 +1,109 @@
+"""Nodes of a lining: what pushes where, with the gate shut and open."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+
+from mpm.half_model import ring_factors, whole_ring
+from mpm.points import initial_stress
+
+
+def contact_nodes(scene, mesh):
+    """Nodes of the outer faces, of the channel's walls and of the inner face beside it, in this order.
+
+    Returns
+    -------
+    SimpleNamespace
+        node: (n_contact,) int; normal, normal_open: (n_contact, 2) float64, into the material, with the gate
+        shut and open; active, active_open: (n_contact,) int8, whether the wall is there; friction: (n_contact,);
+        lining: a SimpleNamespace for each tunnel with theta [deg], arc [m], rows of the contact arrays, factors of
+        their impulses, and whether they bear with the gate open; moved_by: rows that move with each tunnel's lining.
+    """
+    node, closed, opened, active_closed, active_open, friction = [], [], [], [], [], []
+    lining = []
+    corner_angle = {}
+    opening = set(mesh.opening_nodes.tolist()) if scene.gate is not None else set()
+    corners = mesh.corner_nodes.tolist() if scene.gate is not None else []
+    if scene.gate is not None:
+        a = math.radians(scene.gate.angle)
+        tangent = np.array([math.cos(a), -math.sin(a)])
+        # the corner on the smaller-angle side bounds the channel from below in angle
+        corner_angle = {i: side * tangent for i, side in zip(corners, mesh.corner_side.tolist(), strict=True)}
+    for t, tunnel in enumerate(scene.tunnels):
+        axis = np.array([tunnel.x, -tunnel.axis_depth])
+        outer = mesh.outer_nodes[t]
+        first = len(node)
+        for i, outward in zip(outer, balanced_normals(scene, mesh, outer), strict=True):
+            node.append(i)
+            closed.append(outward)
+            opened.append(corner_angle.get(int(i), outward))
+            active_closed.append(True)
+            active_open.append(int(i) not in opening)
+            friction.append(tunnel.friction_coefficient)
+        theta, ring = mesh.outer_theta[t], ring_positions(scene, mesh, outer)
+        rows, factors = np.arange(first, len(node)), np.ones((1, 5))
+        if scene.is_half:
+            place = whole_ring(len(outer))
+            outer, rows, factors = outer[place], rows[place], ring_factors(len(outer))
+            theta = np.where(np.arange(len(place)) < len(theta), theta[place], 360.0 - theta[place])
+        edge = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
+        arc = 0.5 * (edge + np.roll(edge, 1))
+        bears_open = np.array([int(i) not in opening and int(i) not in corners for i in outer])
+        lining.append(SimpleNamespace(theta=theta, arc=arc, rows=rows, factors=factors, bears=bears_open))
+    if scene.gate is not None:
+        tunnel = scene.tunnels[scene.gate.tunnel]
+        axis = np.array([tunnel.x, -tunnel.axis_depth])
+        for i, side in zip(mesh.wall_nodes, mesh.wall_side, strict=True):
+            node.append(i)
+            closed.append(side * tangent)
+            opened.append(side * tangent)
+        for i in mesh.inner_nodes:
+            inward = (axis - mesh.nodes[i]) / np.linalg.norm(mesh.nodes[i] - axis)
+            node.append(i)
+            closed.append(inward)
+            opened.append(inward)
+        rest = len(node) - len(active_closed)
+        active_closed += [True] * rest
+        active_open += [True] * rest
+        friction += [tunnel.friction_coefficient] * rest
+    rows = [part.rows for part in lining]
+    if scene.gate is not None:
+        rows[scene.gate.tunnel] = np.r_[rows[scene.gate.tunnel], len(node) - rest : len(node)]
+    return SimpleNamespace(
+        node=np.array(node, int),
+        normal=np.array(closed, float).reshape(-1, 2),
+        normal_open=np.array(opened, float).reshape(-1, 2),
+        active=np.array(active_closed, np.int8),
+        active_open=np.array(active_open, np.int8),
+        friction=np.array(friction, float),
+        lining=lining,
+        moved_by=rows,
+    )
+
+
+def ring_positions(scene, mesh, outer):
+    """Positions of all nodes of a ring, clockwise: those of a half model and their mirror images [m]."""
+    position = mesh.nodes[outer]
+    if not scene.is_half:
+        return position
+    place = whole_ring(len(outer))
+    image = np.arange(len(place)) >= len(outer)
+    return position[place] * np.column_stack([np.where(image, -1.0, 1.0), np.ones(len(place))])
+
+
+def balanced_normals(scene, mesh, outer):
+    """Normals of the outer face along the resultant of the hydrostatic pressure at each node.
+
+    On a polygon the resultant of a pressure on the two edges of a node is not radial. A wall
+    that can only push along the radius would let still water creep along it.
+    """
+    position = ring_positions(scene, mesh, outer)
+    _, pressure = initial_stress(scene, -position[:, 1])
+    pressure = np.maximum(pressure, 1.0)  # above the water table: as for a uniform pressure
+    edge = np.roll(position, -1, axis=0) - position  # clockwise to the next node
+    outward = np.column_stack([-edge[:, 1], edge[:, 0]])
+    after = np.roll(pressure, -1)
+    force = outward * (2 * pressure + after)[:, None]
+    force += np.roll(outward * (pressure + 2 * after)[:, None], 1, axis=0)
+    return (force / np.linalg.norm(force, axis=1)[:, None])[: len(outer)]
