@@ -269,220 +269,136 @@ def solve_nodes(
     ledger[7] += reactions
 
 
-@kernel_part
-def solve_dry_nodes(
-    first, last, which, next_row, level_of_row, begun, dt_of_level, sums, mean, gravity, density_liquid, fixed,
-    contact_of_node, normal, active, friction, wall, nodes, status, impulse, ledger,
-):  # fmt: skip
-    """`solve_nodes` for dry soil: one momentum equation a node; the water's columns are not touched."""
-    sum_x = sum_y = kinetic = by_gravity = by_stress = unfelt = reactions = 0.0
-    n_nodes = nodes.shape[0] - mean.shape[0]
-    for k in range(first, last):
-        i = which[k]
-        dt = dt_of_level[level_of_row[i]]
-        ms = px = py = fx = fy = 0.0
-        r = i
-        while r >= 0:
-            for part in range(sums.shape[0]):
-                ms += sums[part, r, B_MS]
-                px += sums[part, r, B_PSX]
-                py += sums[part, r, B_PSY]
-                fx += sums[part, r, B_FX]
-                fy += sums[part, r, B_FY]
-            r = next_row[r]
-        if fixed[i] & MIRROR_X:
-            px = 0.0
-        nodes[i, V_MS] = ms
-        status[i] = 0
-        if ms <= 0.0:
-            nodes[i, V_MS] = 0.0
-            stop_rows(i, next_row, nodes, mean)
-            continue
-        ux, uy = px / ms, py / ms
-        px += dt * fx
-        py += dt * (fy - ms * gravity)
-        free_x, free_y = px, py
-        c = contact_of_node[i]
-        if c >= 0 and active[c]:
-            nx, ny = normal[c, 0], normal[c, 1]
-            if wall is not None:
-                px -= ms * wall[c, 0]
-                py -= ms * wall[c, 1]
-                free_x, free_y = px, py
-            pn, pt = nx * px + ny * py, ny * px - nx * py
-            if pn < 0.0:
-                reaction = -pn / dt
-                shear = -pt / dt
-                limit = friction[c] * reaction
-                pn = 0.0
-                status[i] = SOLID_HELD
-                if abs(shear) > limit:
-                    shear = limit if shear > 0.0 else -limit
-                    pt += dt * shear
-                else:
-                    pt = 0.0
-                    status[i] |= SOLID_STICKS
-                impulse[c, 0] += dt * reaction
-                impulse[c, 2] += dt * shear
-                impulse[c, 3] += dt * reaction * reaction
-                px, py = nx * pn + ny * pt, ny * pn - nx * pt
-                unfelt += abs(px - free_x - dt * (nx * reaction + ny * shear))
-                unfelt += abs(py - free_y - dt * (ny * reaction - nx * shear))
-                reactions += dt * reaction
-            if wall is not None:
-                px += ms * wall[c, 0]
-                py += ms * wall[c, 1]
-        vx, vy = px / ms, py / ms
-        if fixed[i] & FIXED_X:
-            vx = 0.0
-        if fixed[i] & FIXED_Y:
-            vy = 0.0
-        nodes[i, V_SX], nodes[i, V_SY] = vx, vy
-        nodes[i, V_DSX], nodes[i, V_DSY] = vx - ux, vy - uy
-        r = next_row[i]
-        while r >= 0:
-            t = r - n_nodes
-            if level_of_row[r] <= begun:
-                for column in range(mean.shape[1]):
-                    mean[t, column] = 0.0
-                nodes[r, V_DSX] = nodes[r, V_DSY] = 0.0
-            share = dt / dt_of_level[level_of_row[r]]
-            mean[t, 0] += share * vx
-            mean[t, 1] += share * vy
-            nodes[r, V_SX], nodes[r, V_SY] = vx, vy
-            nodes[r, V_DSX] += vx - ux
-            nodes[r, V_DSY] += vy - uy
-            for part in range(sums.shape[0]):
-                sums[part, r, B_PSX] += sums[part, r, B_MS] * (vx - ux)
-                sums[part, r, B_PSY] += sums[part, r, B_MS] * (vy - uy)
-            r = next_row[r]
-        sx, sy = 0.5 * (ux + vx), 0.5 * (uy + vy)
-        sum_x += ms * (vx - ux)
-        sum_y += ms * (vy - uy)
-        kinetic += ms * (sx * (vx - ux) + sy * (vy - uy))
-        by_gravity -= dt * gravity * ms * sy
-        by_stress += dt * (sx * fx + sy * fy)
-    ledger[0] += sum_x
-    ledger[1] += sum_y
-    ledger[2] += kinetic
-    ledger[3] += by_gravity
-    ledger[5] += by_stress
-    ledger[6] += unfelt
-    ledger[7] += reactions
+@cache
+def one_velocity_kernel(undrained):
+    """Kernel `solve_one_velocity` for dry soil, or for pore water that moves with the grains."""
 
+    @kernel_part
+    def solve_one_velocity(
+        first, last, which, next_row, level_of_row, begun, dt_of_level, sums, mean, gravity, density_liquid, fixed,
+        contact_of_node, normal, active, friction, wall, nodes, status, impulse, ledger,
+    ):  # fmt: skip
+        """`solve_nodes` with one momentum equation a node: of the grains, or undrained, of the mixture.
 
-@kernel_part
-def solve_undrained_nodes(
-    first, last, which, next_row, level_of_row, begun, dt_of_level, sums, mean, gravity, density_liquid, fixed,
-    contact_of_node, normal, active, friction, wall, nodes, status, impulse, ledger,
-):  # fmt: skip
-    """`solve_nodes` for water that moves with the grains: the limit of infinite drag, one momentum equation a node.
+        Undrained is the limit of infinite drag. A wall pushes the mixture or lets it go. Of its push the water bears
+        what holds its own momentum, M_l v + dt F_l, but no more than all and no tension; grains bear the rest, which
+        limits friction. `nodes` columns of the water's velocity are not touched; V_MS is the mass that moves.
+        """
+        sum_x = sum_y = kinetic = by_gravity = by_stress = unfelt = reactions = 0.0
+        n_nodes = nodes.shape[0] - mean.shape[0]
+        for k in range(first, last):
+            i = which[k]
+            dt = dt_of_level[level_of_row[i]]
+            mass = ml = px = py = fx = fy = flx = fly = 0.0
+            r = i
+            while r >= 0:
+                ml_row = q = 0.0
+                for part in range(sums.shape[0]):
+                    mass += sums[part, r, B_MS]
+                    px += sums[part, r, B_PSX]
+                    py += sums[part, r, B_PSY]
+                    fx += sums[part, r, B_FX]
+                    fy += sums[part, r, B_FY]
+                    if undrained:
+                        mass += sums[part, r, B_MN]
+                        ml_row += sums[part, r, B_ML]
+                        q += sums[part, r, B_Q]
+                        flx += sums[part, r, B_FLX]
+                        fly += sums[part, r, B_FLY]
+                if undrained:
+                    ml += ml_row
+                    if ml_row <= 0.0:
+                        nodes[r, V_P] = 0.0
+                    elif level_of_row[r] <= begun:
+                        nodes[r, V_P] += q * density_liquid / ml_row
+                r = next_row[r]
+            if fixed[i] & MIRROR_X:
+                px = 0.0
+            nodes[i, V_MS] = mass
+            status[i] = 0
+            if mass <= 0.0:
+                nodes[i, V_MS] = 0.0
+                stop_rows(i, next_row, nodes, mean)
+                continue
+            ux, uy = px / mass, py / mass
+            px += dt * fx
+            py += dt * (fy - mass * gravity)
+            c = contact_of_node[i]
+            if c >= 0 and active[c]:
+                nx, ny = normal[c, 0], normal[c, 1]
+                if wall is not None:
+                    px -= mass * wall[c, 0]
+                    py -= mass * wall[c, 1]
+                pn, pt = nx * px + ny * py, ny * px - nx * py
+                if pn < 0.0:
+                    reaction = push = -pn / dt
+                    if undrained:
+                        water = -(ml * (nx * ux + ny * uy) / dt + nx * flx + ny * (fly - ml * gravity))
+                        water = min(max(water, 0.0), push)
+                        reaction = push - water
+                        impulse[c, 1] += dt * water
+                        impulse[c, 4] += dt * water * water
+                    shear = -pt / dt
+                    limit = friction[c] * reaction
+                    status[i] = SOLID_HELD
+                    if abs(shear) > limit:
+                        shear = limit if shear > 0.0 else -limit
+                        pt += dt * shear
+                    else:
+                        pt = 0.0
+                        status[i] |= SOLID_STICKS
+                    impulse[c, 0] += dt * reaction
+                    impulse[c, 2] += dt * shear
+                    impulse[c, 3] += dt * reaction * reaction
+                    unfelt += abs(ny * pt - px - dt * (nx * push + ny * shear))
+                    unfelt += abs(-nx * pt - py - dt * (ny * push - nx * shear))
+                    reactions += dt * push
+                    px, py = ny * pt, -nx * pt
+                if wall is not None:
+                    px += mass * wall[c, 0]
+                    py += mass * wall[c, 1]
+            vx, vy = px / mass, py / mass
+            if fixed[i] & FIXED_X:
+                vx = 0.0
+            if fixed[i] & FIXED_Y:
+                vy = 0.0
+            nodes[i, V_SX], nodes[i, V_SY] = vx, vy
+            nodes[i, V_DSX], nodes[i, V_DSY] = vx - ux, vy - uy
+            r = next_row[i]
+            while r >= 0:
+                t = r - n_nodes
+                if level_of_row[r] <= begun:
+                    for column in range(mean.shape[1]):
+                        mean[t, column] = 0.0
+                    nodes[r, V_DSX] = nodes[r, V_DSY] = 0.0
+                share = dt / dt_of_level[level_of_row[r]]
+                mean[t, 0] += share * vx
+                mean[t, 1] += share * vy
+                nodes[r, V_SX], nodes[r, V_SY] = vx, vy
+                nodes[r, V_DSX] += vx - ux
+                nodes[r, V_DSY] += vy - uy
+                for part in range(sums.shape[0]):
+                    held = sums[part, r, B_MS]
+                    if undrained:
+                        held += sums[part, r, B_MN]
+                    sums[part, r, B_PSX] += held * (vx - ux)
+                    sums[part, r, B_PSY] += held * (vy - uy)
+                r = next_row[r]
+            sx, sy = 0.5 * (ux + vx), 0.5 * (uy + vy)
+            sum_x += mass * (vx - ux)
+            sum_y += mass * (vy - uy)
+            kinetic += mass * (sx * (vx - ux) + sy * (vy - uy))
+            by_gravity -= dt * gravity * mass * sy
+            by_stress += dt * (sx * fx + sy * fy)
+        ledger[0] += sum_x
+        ledger[1] += sum_y
+        ledger[2] += kinetic
+        ledger[3] += by_gravity
+        ledger[5] += by_stress
+        ledger[6] += unfelt
+        ledger[7] += reactions
 
-    A wall pushes the mixture or lets it go. Of its push the water bears what holds its own momentum, M_l v + dt F_l,
-    but no more than all and no tension; grains bear the rest, which limits friction. `nodes` columns of the water's
-    velocity are not touched; V_MS is the mass of the mixture.
-    """
-    sum_x = sum_y = kinetic = by_gravity = by_stress = unfelt = reactions = 0.0
-    n_nodes = nodes.shape[0] - mean.shape[0]
-    for k in range(first, last):
-        i = which[k]
-        dt = dt_of_level[level_of_row[i]]
-        mass = ml = px = py = fx = fy = flx = fly = 0.0
-        r = i
-        while r >= 0:
-            ml_row = q = 0.0
-            for part in range(sums.shape[0]):
-                mass += sums[part, r, B_MS] + sums[part, r, B_MN]
-                ml_row += sums[part, r, B_ML]
-                px += sums[part, r, B_PSX]
-                py += sums[part, r, B_PSY]
-                q += sums[part, r, B_Q]
-                fx += sums[part, r, B_FX]
-                fy += sums[part, r, B_FY]
-                flx += sums[part, r, B_FLX]
-                fly += sums[part, r, B_FLY]
-            ml += ml_row
-            if ml_row <= 0.0:
-                nodes[r, V_P] = 0.0
-            elif level_of_row[r] <= begun:
-                nodes[r, V_P] += q * density_liquid / ml_row
-            r = next_row[r]
-        if fixed[i] & MIRROR_X:
-            px = 0.0
-        nodes[i, V_MS] = mass
-        status[i] = 0
-        if mass <= 0.0:
-            nodes[i, V_MS] = 0.0
-            stop_rows(i, next_row, nodes, mean)
-            continue
-        ux, uy = px / mass, py / mass
-        px += dt * fx
-        py += dt * (fy - mass * gravity)
-        c = contact_of_node[i]
-        if c >= 0 and active[c]:
-            nx, ny = normal[c, 0], normal[c, 1]
-            pn, pt = nx * px + ny * py, ny * px - nx * py
-            if pn < 0.0:
-                push = -pn / dt
-                water = -(ml * (nx * ux + ny * uy) / dt + nx * flx + ny * (fly - ml * gravity))
-                water = min(max(water, 0.0), push)
-                reaction = push - water
-                shear = -pt / dt
-                limit = friction[c] * reaction
-                status[i] = SOLID_HELD
-                if abs(shear) > limit:
-                    shear = limit if shear > 0.0 else -limit
-                    pt += dt * shear
-                else:
-                    pt = 0.0
-                    status[i] |= SOLID_STICKS
-                impulse[c, 0] += dt * reaction
-                impulse[c, 1] += dt * water
-                impulse[c, 2] += dt * shear
-                impulse[c, 3] += dt * reaction * reaction
-                impulse[c, 4] += dt * water * water
-                unfelt += abs(ny * pt - px - dt * (nx * push + ny * shear))
-                unfelt += abs(-nx * pt - py - dt * (ny * push - nx * shear))
-                reactions += dt * push
-                px, py = ny * pt, -nx * pt
-        vx, vy = px / mass, py / mass
-        if fixed[i] & FIXED_X:
-            vx = 0.0
-        if fixed[i] & FIXED_Y:
-            vy = 0.0
-        nodes[i, V_SX], nodes[i, V_SY] = vx, vy
-        nodes[i, V_DSX], nodes[i, V_DSY] = vx - ux, vy - uy
-        r = next_row[i]
-        while r >= 0:
-            t = r - n_nodes
-            if level_of_row[r] <= begun:
-                for column in range(mean.shape[1]):
-                    mean[t, column] = 0.0
-                nodes[r, V_DSX] = nodes[r, V_DSY] = 0.0
-            share = dt / dt_of_level[level_of_row[r]]
-            mean[t, 0] += share * vx
-            mean[t, 1] += share * vy
-            nodes[r, V_SX], nodes[r, V_SY] = vx, vy
-            nodes[r, V_DSX] += vx - ux
-            nodes[r, V_DSY] += vy - uy
-            for part in range(sums.shape[0]):
-                held = sums[part, r, B_MS] + sums[part, r, B_MN]
-                sums[part, r, B_PSX] += held * (vx - ux)
-                sums[part, r, B_PSY] += held * (vy - uy)
-            r = next_row[r]
-        sx, sy = 0.5 * (ux + vx), 0.5 * (uy + vy)
-        sum_x += mass * (vx - ux)
-        sum_y += mass * (vy - uy)
-        kinetic += mass * (sx * (vx - ux) + sy * (vy - uy))
-        by_gravity -= dt * gravity * mass * sy
-        by_stress += dt * (sx * fx + sy * fy)
-    ledger[0] += sum_x
-    ledger[1] += sum_y
-    ledger[2] += kinetic
-    ledger[3] += by_gravity
-    ledger[5] += by_stress
-    ledger[6] += unfelt
-    ledger[7] += reactions
+    return solve_one_velocity
 
 
 @cache

@@ -11,10 +11,9 @@ from mpm.contact import (
     FIXED_X,
     FIXED_Y,
     MIRROR_X,
+    one_velocity_kernel,
     remap_kernel,
-    solve_dry_nodes,
     solve_nodes,
-    solve_undrained_nodes,
 )
 from mpm.contact_nodes import contact_nodes
 from mpm.half_model import right_half, with_mirrored_points
@@ -202,7 +201,7 @@ class Solver:
         undrained = scene.is_undrained
         dilatant = plastic and any(soil.dilatancy_angle > 0 for soil in scene.soils if soil.model != "elastic")
         self._long_step = long_step_kernel(
-            solve_undrained_nodes if undrained else solve_nodes if wet else solve_dry_nodes,
+            solve_nodes if wet and not undrained else one_velocity_kernel(undrained),
             advance_kernel(wet, undrained, tied, scene.numerics.remapping),
             remap_kernel(wet and not undrained, scene.numerics.remapping),
             rates_kernel(wet, undrained),

@@ -10,7 +10,7 @@ import coupling.datasets
 import coupling.plan
 import mpm
 import mpm.scene
-from mpm.contact import solve_nodes, solve_undrained_nodes
+from mpm.contact import one_velocity_kernel, solve_nodes
 from mpm.variables import (
     B_D,
     B_FLX,
@@ -198,7 +198,7 @@ def test_wall_pushes_an_undrained_mixture_as_two_tied_phases():
     normal = np.column_stack([np.cos(angle), np.sin(angle)])
     row = np.arange(n, dtype=np.int32)
     found = []
-    for solve, mixed in ((solve_nodes, False), (solve_undrained_nodes, True)):
+    for solve, mixed in ((solve_nodes, False), (one_velocity_kernel(True), True)):
         given = sums.copy()
         if mixed:
             given[0, :, [B_PSX, B_PSY]] = speed * (sums[0, :, B_MS] + sums[0, :, B_MN])
