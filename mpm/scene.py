@@ -312,7 +312,9 @@ class Stop(Part):
     @model_validator(mode="after")
     def _check(self):
         if self.time is None and self.inflow_mass is None:
-            raise ValueError("time or inflow_mass must be given, got neither; without them the run never ends: give one or both")
+            raise ValueError(
+                "time or inflow_mass must be given, got neither; without them the run never ends: give one or both"
+            )
         return self
 
 
