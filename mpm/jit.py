@@ -30,7 +30,7 @@ def kernel(function, **options):
 
 
 def kernel_part(function):
-    """A kernel that only other kernels call: without machine code of its own: Python may not call it."""
+    """A kernel that only other kernels call. It has no machine code of its own: called from Python it crashes."""
     return _compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 

@@ -63,15 +63,12 @@ def dropped_block(width=1.6, size=0.1):
 def test_dropped_block_lands_and_takes_up_the_area_its_grains_need():
     solver = dropped_block()
     mass = np.sum(solver.points[:, MASS])
-    fastest, late = 0.0, []
-    while solver.time < 3.0:
+    fastest = 0.0
+    while solver.time < 6.0:  # its slopes slide a little now and then until 5 s
         solver.step()
-        fastest = max(fastest, speed(solver))
-        if solver.time > 2.5:
-            late.append(speed(solver))
+        fastest = max(fastest, speed(solver)) if solver.step_count % 100 == 0 else fastest
     assert fastest > 0.7 * np.sqrt(2 * 9.81 * 0.3)  # it did fall
-    # its slopes slide a little now and then until 5 s, after which 0.01 m/s are left
-    assert np.mean(late) < 0.05 * fastest
+    assert speed(solver) < 0.02 * fastest
     assert np.sum(solver.points[:, MASS]) == mass
     element, area = solver.element_of_point, solver.geometry[:, 6]
     volume = np.bincount(element, solver.points_by_name()["volume"], len(area))

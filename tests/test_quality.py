@@ -58,12 +58,12 @@ def test_balances_while_material_gushes(event):  # noqa: F811
 
 
 def test_transfers_take_little_energy_at_short_steps():
-    numerics = Numerics(courant=0.4)
-    scene = quick(stop=Stop(inflow_mass=60.0, time=2.0), numerics=numerics)
+    # Corners that slip: at held ones shearing takes what the ground gives, and the stresses' own work is no measure.
+    gate = quick().gate.model_copy(update={"corners": "slipping"})
+    scene = quick(gate=gate, stop=Stop(inflow_mass=60.0, time=2.0), numerics=Numerics(courant=0.4))
     last = list(simulate(scene))[-1].balances
-    # Of the work of gravity, where the jet has just begun: 3 % on this mesh, 5 % at the default of 0.8. (The stresses'
-    # own work is no measure: what the ground gives to the jet is about what shearing takes.)
-    assert 0 < last["transfer_loss"] < 0.05 * last["work_gravity"]
+    # Where the jet has just begun: 5 % on this mesh; 12 % at the default of 0.8.
+    assert 0 < last["transfer_loss"] < 0.1 * last["work_stress"]
 
 
 def test_quality_is_in_the_file_the_log_and_the_line(simulated, tmp_path):  # noqa: F811
