@@ -3,7 +3,7 @@
     uv run python benchmarks/lost_worker.py           # 64 coarse runs; fewer, from 4 on, as an argument
 
 The study must end complete and equal to the serial one, bit for bit. Prints what happened as JSON and writes its part
-of docs/robustness.md and docs/robustness.json.
+of docs/robustness.md and docs/robustness.json, with --print-only not.
 """
 
 import argparse
@@ -81,7 +81,9 @@ def killed_study(count, folder):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("count", type=int, nargs="?", default=64, help="number of runs, from 4 on")
-    count = parser.parse_args().count
+    parser.add_argument("--print-only", action="store_true", help="leave docs/robustness.md as it is")
+    chosen = parser.parse_args()
+    count = chosen.count
     with tempfile.TemporaryDirectory() as place:
         begin = clock.monotonic()
         parallel, lines, killed = killed_study(count, Path(place) / "parallel")
@@ -102,9 +104,10 @@ def main():
         "parallel_seconds": between - begin,
         "serial_seconds": end - between,
     }
-    from robustness_page import write_part
+    if not chosen.print_only:
+        from robustness_page import write_part
 
-    write_part("lost_worker", result)
+        write_part("lost_worker", result)
     print(json.dumps(result, indent=1))
     raise SystemExit(0 if not different and result["finished"] == count and killed else 1)
 
