@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from browser import Browser, find_browser
+from browser import find_browser
 from page_in_browser import CONTRAST, choose, number, show_frame, spoken, wider_than_the_screen, written_as
 from report_run import write_run
 from synthetic_run import record
@@ -41,25 +41,8 @@ def tree(run):
 
 
 @pytest.fixture(scope="module")
-def browser():
-    with Browser(find_browser()) as opened:
-        yield opened
-
-
-@pytest.fixture(scope="module")
 def report(run):
     return page.write_report(run)
-
-
-@pytest.fixture
-def opened(report, browser):
-    """The browser with the page of the run, fresh."""
-    browser.complaints.clear()
-    browser.requests.clear()
-    browser.resize(1366, 768)
-    browser.open(report)
-    yield browser
-    assert browser.complaints == []
 
 
 def test_the_page_asks_for_nothing_but_itself(opened, report):

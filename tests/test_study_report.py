@@ -6,7 +6,6 @@ import shutil
 
 import numpy as np
 import pytest
-from browser import Browser, find_browser
 from page_in_browser import CONTRAST, choose, number, show_frame, spoken, wider_than_the_screen, written_as
 from report_study import REASON, write_study
 from typer.testing import CliRunner
@@ -43,27 +42,8 @@ def collected(folder):
 
 
 @pytest.fixture(scope="module")
-def browser():
-    if find_browser() is None:
-        pytest.skip("no Chromium on this machine; Debian: apt-get install chromium-headless-shell")
-    with Browser(find_browser()) as opened:
-        yield opened
-
-
-@pytest.fixture(scope="module")
 def report(folder):
     return page.write_report(folder)
-
-
-@pytest.fixture
-def opened(report, browser):
-    """The browser with the page of the study, fresh."""
-    browser.complaints.clear()
-    browser.requests.clear()
-    browser.resize(1366, 768)
-    browser.open(report)
-    yield browser
-    assert browser.complaints == []
 
 
 # -- without a browser ------------------------------------------------------------------------------
