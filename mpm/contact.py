@@ -93,7 +93,7 @@ def stop_rows(i, next_row, nodes, mean):
 
 @kernel_part
 def solve_nodes(
-    first, last, which, next_row, level_of_row, begun, dt_of_level, sums, mean, gravity, density_liquid, fixed,
+    first, last, which, next_row, level_of_row, begun, dt_of_level, touched, sums, mean, gravity, density_liquid, fixed,
     contact_of_node, normal, active, friction, wall, nodes, status, impulse, ledger,
 ):  # fmt: skip
     """Add up the parts of a range of nodes and advance both phases by the time step of each node's finest level.
@@ -106,6 +106,8 @@ def solve_nodes(
         Levels up to this one begin a step now.
     dt_of_level : (n_levels,) float64
         [s]
+    touched : (n_parts, n_rows) uint8
+        Whether a part may have added to a row; else it holds zeros, which are not read.
     sums : (n_parts, n_rows, 13) float64
         What the parts of the mesh add to the rows; added in the order of the parts. Written: momenta of rows tied to
         a finer one, which follow the node.
@@ -138,6 +140,8 @@ def solve_nodes(
         while r >= 0:
             ml_row = q = 0.0
             for part in range(sums.shape[0]):
+                if touched[part, r] == 0:
+                    continue
                 ms += sums[part, r, B_MS]
                 ml_row += sums[part, r, B_ML]
                 mn += sums[part, r, B_MN]
@@ -275,8 +279,8 @@ def one_velocity_kernel(undrained):
 
     @kernel_part
     def solve_one_velocity(
-        first, last, which, next_row, level_of_row, begun, dt_of_level, sums, mean, gravity, density_liquid, fixed,
-        contact_of_node, normal, active, friction, wall, nodes, status, impulse, ledger,
+        first, last, which, next_row, level_of_row, begun, dt_of_level, touched, sums, mean, gravity, density_liquid,
+        fixed, contact_of_node, normal, active, friction, wall, nodes, status, impulse, ledger,
     ):  # fmt: skip
         """`solve_nodes` with one momentum equation a node: of the grains, or undrained, of the mixture.
 
@@ -294,6 +298,8 @@ def one_velocity_kernel(undrained):
             while r >= 0:
                 ml_row = q = 0.0
                 for part in range(sums.shape[0]):
+                    if touched[part, r] == 0:
+                        continue
                     mass += sums[part, r, B_MS]
                     px += sums[part, r, B_PSX]
                     py += sums[part, r, B_PSY]
@@ -410,31 +416,36 @@ def remap_kernel(two_phase, remapping):
 
     @kernel_part
     def remap_nodes(
-        first, last, which, next_row, level_of_row, finished, dt_of_level, momenta, sums, mean, fixed, contact_of_node,
-        normal, active, wall, nodes, status,
+        first, last, which, next_row, level_of_row, finished, dt_of_level, touched, means, sums, mean, fixed,
+        contact_of_node, normal, active, wall, nodes, status,
     ):  # fmt: skip
         """Nodal velocities from the updated point momenta (MUSL), under the constraints that acted in this step.
 
         Rows of levels up to `finished` have new momenta; the others keep the node's, which `solve_nodes` has followed
         in `sums`, and their own velocities become the mean over their step when it ends.
+
+        means : (n_parts, n_rows, 9) float64
+            The first four columns are those momenta, of `advance_points`; cleared for `element_rates`.
         """
         n_nodes = nodes.shape[0] - mean.shape[0]
         for k in range(first, last):
             i = which[k]
-            if nodes[i, V_MS] <= 0.0:
-                continue
+            sx = sy = lx = ly = 0.0
             if remapping:
-                sx = sy = lx = ly = 0.0
                 r = i
                 while r >= 0:
                     done = level_of_row[r] <= finished
-                    for part in range(momenta.shape[0]):
+                    for part in range(means.shape[0]):
+                        if touched[part, r] == 0:
+                            continue
                         if done:
-                            sx += momenta[part, r, 0]
-                            sy += momenta[part, r, 1]
+                            sx += means[part, r, 0]
+                            sy += means[part, r, 1]
                             if two_phase:
-                                lx += momenta[part, r, 2]
-                                ly += momenta[part, r, 3]
+                                lx += means[part, r, 2]
+                                ly += means[part, r, 3]
+                            for column in range(NODAL_MOMENTA):
+                                means[part, r, column] = 0.0
                         else:
                             sx += sums[part, r, B_PSX]
                             sy += sums[part, r, B_PSY]
@@ -442,6 +453,9 @@ def remap_kernel(two_phase, remapping):
                                 lx += sums[part, r, B_PLX]
                                 ly += sums[part, r, B_PLY]
                     r = next_row[r]
+            if nodes[i, V_MS] <= 0.0:
+                continue
+            if remapping:
                 sx /= nodes[i, V_MS]
                 sy /= nodes[i, V_MS]
                 if two_phase:
@@ -498,22 +512,26 @@ def remap_kernel(two_phase, remapping):
 
 
 @kernel_part
-def smooth_rates(first, last, which, means, momenta, sums, nodes, fill):
+def smooth_rates(first, last, which, touched, means, sums, nodes, fill):
     """Nodal means of the divergences and of the gradient of the projected pressure (Detournay & Dzik 2006).
 
     Within a level. What the step has read of these rows is cleared for what comes next.
 
     which : (n_rows,) int32
         The rows, by level.
+    touched : (n_parts, n_rows) uint8, cleared too.
     means : (n_parts, n_rows, 9) float64, of `element_rates`. A row without weight keeps what it had.
     fill : (n_rows,) float64
         Written: volume over area of the elements with points [-].
-    momenta, sums : (n_parts, n_rows, 4), (n_parts, n_rows, 13) float64
+    sums : (n_parts, n_rows, 13) float64
     """
     for k in range(first, last):
         i = which[k]
         volume = ts = wet = ws = wl = gx = gy = spread = area = 0.0
         for part in range(means.shape[0]):
+            if touched[part, i] == 0:
+                continue
+            touched[part, i] = 0
             volume += means[part, i, 0]
             ts += means[part, i, 1]
             wet += means[part, i, 2]
@@ -525,8 +543,6 @@ def smooth_rates(first, last, which, means, momenta, sums, nodes, fill):
             area += means[part, i, 8]
             for column in range(NODAL_MEANS):
                 means[part, i, column] = 0.0
-            for column in range(NODAL_MOMENTA):
-                momenta[part, i, column] = 0.0
             for column in range(BUFFER_WIDTH):
                 sums[part, i, column] = 0.0
         if volume > 0.0:

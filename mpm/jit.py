@@ -4,6 +4,10 @@ import os
 
 import numba
 import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
 
 from mpm.kernel_cache import KernelCache, kernel_folder, variant_name
 
@@ -44,5 +48,25 @@ def inline_kernel(function):
     return kernel(function, inline="always")
 
 
+LINE = 64  # bytes of a cache line
+
 # Of an index without sign numba knows that it does not count from the end: a tenth of a step is the test for that.
 index = np.uint64
+
+
+@intrinsic
+def prefetch(typing_context, array, row):
+    """Have a row of 128 bytes of an array brought into the cache; row : unsigned, in bounds."""
+
+    def lower(context, builder, signature, arguments):
+        view = context.make_array(signature.args[0])(context, builder, arguments[0])
+        byte, number = ir.IntType(8).as_pointer(), ir.IntType(32)
+        kind = ir.FunctionType(ir.VoidType(), [byte, number, number, number])
+        fetch = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0i8")
+        first = builder.mul(cgutils.unpack_tuple(builder, view.strides)[0], arguments[1])
+        for offset in (0, LINE):
+            place = builder.gep(builder.bitcast(view.data, byte), [builder.add(first, ir.Constant(first.type, offset))])
+            builder.call(fetch, [place, number(0), number(3), number(1)])  # to read, to keep, data
+        return context.get_dummy_value()
+
+    return types.void(array, types.uint64), lower

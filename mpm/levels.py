@@ -14,7 +14,6 @@ elements with steps of their own after Lew, Marsden, Ortiz & West (2003), Asynch
 """
 
 import copy
-import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -66,35 +65,10 @@ class Levels:
         """Factor by which its own step makes an element stiffer for a spectrum in steps of level 0: (n_elements,)."""
         return 4.0**self.of_element * (1 + 2 * self.ahead(2 ** np.arange(self.count)))
 
-    def plan(self, points, most):
-        """How the levels step on the way to the next output time, at the least work.
-
-        Parameters
-        ----------
-        points : (n_levels,) int
-            Points held by each level.
-        most : float
-            Time until then over the step of the finest level that holds points [-]; may be infinite.
-
-        Returns
-        -------
-        periods : (n_levels,) int64
-            Steps of the finest level that holds points in one step of each level: powers of two, ascending.
-        steps : int
-            Steps of the coarsest level until then, all of one length; 1 where there is no such time.
-        """
-        points = points.tolist()
-        held = [level for level, count in enumerate(points) if count > 0] or [0]
-        best, least = None, math.inf
-        for top in range(held[0], held[-1] + 1):
-            periods = [1 << (min(max(level, held[0]), top) - held[0]) for level in range(self.count)]
-            steps = max(math.ceil(most / periods[-1] - 1e-9), 1) if most < math.inf else 1
-            span = steps * periods[-1]  # in steps of the finest level
-            work = sum(count * (span // period) for count, period in zip(points, periods, strict=True))
-            work /= 1 if most < math.inf else span
-            if work <= least:
-                best, least = (periods, steps), work
-        return np.array(best[0], np.int64), best[1]
+    @cached_property
+    def finest_around(self):
+        """Finest level at the nodes of each element: (n_elements,) int8; its own where it meets no finer one."""
+        return self.of_row[self.node_of_row[self.rows]].min(axis=1)
 
     def ahead(self, periods):
         """How far the stress of elements that meet a finer level has to run ahead, in steps of the element.
@@ -107,10 +81,7 @@ class Levels:
         (n_elements,) float64
             (N - 1) / (2 N) by the finest level at the element's nodes; 0 where they all are of its own.
         """
-        n_nodes = len(self.nodes)
-        finest = self.of_row[self.node_of_row[self.rows]].min(axis=1)
-        share = periods[finest] / periods[self.of_element]
-        return np.where((self.rows >= n_nodes).any(axis=1), 0.5 * (1.0 - share), 0.0)
+        return 0.5 * (1.0 - periods[self.finest_around] / periods[self.of_element])
 
 
 def element_levels(elements, n_nodes, altitude, weight):

@@ -1,4 +1,4 @@
-"""One long step in compiled code: all its substeps, pass by pass, by threads that meet between the passes.
+"""Long steps in compiled code: all their substeps, pass by pass, by threads that meet between the passes.
 
 Every thread calls the same kernel and shares the passes with the others (`mpm.meeting`). The parts are those of the
 mesh, whatever the number of threads, and so are the bits.
@@ -10,21 +10,26 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
+from mpm.clock import END, NOW, SMALLEST, SPAN, plan_step
 from mpm.contact import smooth_rates
 from mpm.jit import kernel, kernel_part
 from mpm.meeting import next_part, next_stage, take_part
-from mpm.points import cut_by_points, update_order
-from mpm.variables import MASS, V_GX
+from mpm.points import cut_by_work, follow_points
+from mpm.variables import V_GX
 
 #: Of the process, in microseconds (POSIX).
 processor_time = types.ExternalFunction("clock", types.int64())
-#: Passes of a substep, in their order. A range of them may be run alone.
-PASSES = ("solve_nodes", "advance_points", "remap_nodes", "element_rates", "smooth_rates", "update_points", "relocate")
-(SOLVE, ADVANCE, REMAP, RATES, SMOOTH, UPDATE, FOLLOW) = range(len(PASSES))
+#: Passes of a substep, in their order, after one that plans the long step. A range of them may be run alone.
+PASSES = (
+    "plan_step", "solve_nodes", "advance_points", "remap_nodes", "element_rates", "smooth_rates", "update_points",
+    "locate", "follow_points",
+)  # fmt: skip
+(PLAN, SOLVE, ADVANCE, REMAP, RATES, SMOOTH, UPDATE, LOCATE, FOLLOW) = range(len(PASSES))
 #: What the passes count, beside the arrays: places in `Tally.counts`.
-(OCCUPIED, ACTIVE, SUSPENDED, BAD, SUBSTEPS, POINT_STEPS) = range(6)
+(OCCUPIED, ACTIVE, SUSPENDED, SUBSTEPS, POINT_STEPS) = range(5)
 #: And in `Tally.measures`: the largest time step over the critical one it led to, mass of the points taken out.
 LARGEST_COURANT, REMOVED_MASS = range(2)
+ALMOST_ALL = 1 - 1e-12  # of the time until the end: what is left is rounding
 
 
 class Ground(NamedTuple):
@@ -47,7 +52,6 @@ class Net(NamedTuple):
     neighbours: np.ndarray
     level_of_element: np.ndarray
     element_cuts: np.ndarray  # of the levels
-    ahead: np.ndarray
     volume: np.ndarray
     fill: np.ndarray
     rates: np.ndarray
@@ -59,9 +63,9 @@ class Net(NamedTuple):
     nodes: np.ndarray
     tied_means: np.ndarray
     status: np.ndarray
+    touched: np.ndarray  # (n_parts, n_rows) uint8
     sums: np.ndarray
-    momenta: np.ndarray
-    nodal_means: np.ndarray
+    means: np.ndarray
 
 
 class Walls(NamedTuple):
@@ -84,27 +88,24 @@ class Cuts(NamedTuple):
     rows: np.ndarray
 
 
-class Clock(NamedTuple):
-    """Time steps of the levels [s], their shares of FLIP and of the filter of the pore pressure.
-
-    `begun`, `finished`: the coarsest levels that begin and end a step in each substep; `smallest`: step of level 0.
-    """
-
-    dt_of_level: np.ndarray
-    flip_of_level: np.ndarray
-    filter_of_level: np.ndarray
-    begun: np.ndarray
-    finished: np.ndarray
-    smallest: float
-
-
 class Medium(NamedTuple):
-    """Numbers of the scene, and the wave speed that stands for its critical step [m/s]."""
+    """Numbers of the scene."""
 
     gravity: float
     density_liquid: float
     bulk_liquid: float
-    wave_speed: float
+
+
+class Batch(NamedTuple):
+    """Long steps one after the other: of each its substeps and what limited it, and when there are enough.
+
+    The arrays are of this batch alone: a thread that is late may still read them when the next one has begun.
+    """
+
+    substeps: np.ndarray  # (most + 1,) int64; 0 ends the batch
+    limits: np.ndarray  # (most,) int64, places in `mpm.clock.LIMITS`
+    most_substeps: int  # no further long step begins after so many of the finest level
+    most_point_steps: int
 
 
 class Tally(NamedTuple):
@@ -112,15 +113,15 @@ class Tally(NamedTuple):
 
     counts: np.ndarray
     measures: np.ndarray
-    limits: np.ndarray  # (n_parts + 1, 2): of the time step, by part and of points that were relocated
+    limits: np.ndarray  # (2 n_parts, 2): of the time step, by part, and of the points that left their element
     suspended: np.ndarray  # (n_parts,)
     bad: np.ndarray  # (n_parts,)
     n_left: np.ndarray  # (n_parts,)
+    first_left: np.ndarray  # (n_parts,) where the points of each part begin in the next two
     clamps: np.ndarray
     ledger: np.ndarray
-    left: np.ndarray
-    moved_point: np.ndarray
-    moved_from: np.ndarray
+    left: np.ndarray  # (n_points,) points that left their element
+    origin: np.ndarray  # (n_points,) that element
     spare_start: np.ndarray
     spare_order: np.ndarray
     used: np.ndarray  # (n_passes,) processor time of each pass [microseconds], or empty: not measured
@@ -128,157 +129,230 @@ class Tally(NamedTuple):
 
 @kernel_part
 def lap(used, which, thread, mark):
-    """Add the processor time since `mark` to that of a pass; returns the time now. Nothing where it is not measured."""
+    """Add the processor time since `mark`, if any, to that of a pass; returns the time now. 0: it is not measured."""
     if used.size == 0 or thread > 0:
-        return mark
+        return 0
     now = processor_time()
-    used[which] += now - mark
+    if mark > 0:
+        used[which] += now - mark
     return now
 
 
+@kernel_part
+def points_before(ground, element_cuts, cuts, finished, part):
+    """Number of points that the parts before a part hold in the levels up to `finished`."""
+    count = 0
+    for level in range(finished + 1):
+        place = cuts[level, part]
+        if place < cuts[-1, -1]:
+            count += ground.start[ground.occupied[place]] - ground.start[element_cuts[level]]
+        else:
+            count += ground.start[element_cuts[level + 1]] - ground.start[element_cuts[level]]
+    return count
+
+
 @cache
-def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, update_points, relocate):
+def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, update_points, locate):
     """Kernel `long_step` of the kernels that a scene needs."""
 
     @kernel_part
-    def follow(ground, net, cuts, medium, clock, finished, tally):
-        """Note what the update found; move points that left their element to where they are."""
-        counts, limits = tally.counts, tally.limits
+    def follow(ground, net, cuts, clock, finished, tally):
+        """Note what the update of a substep found, and repair the list of points."""
+        counts = tally.counts
+        counts[SUBSTEPS] += 1
+        counts[POINT_STEPS] += ground.start[net.element_cuts[finished + 1]]
         counts[SUSPENDED] = tally.suspended.sum()
-        for part in range(tally.bad.size):
-            if tally.bad[part] >= 0:
-                counts[BAD] = tally.bad[part]
-                return
         critical = np.inf
         for part in range(tally.n_left.size):
-            critical = min(critical, limits[part, 0])
-        limits[-1, 0], limits[-1, 1] = np.inf, 0.0
-        tally.measures[LARGEST_COURANT] = max(tally.measures[LARGEST_COURANT], clock.smallest / critical)
-        if tally.n_left.sum() == 0:
-            return
-        n_moved, removed, limits[-1, 0], limits[-1, 1] = relocate(
-            tally.left, tally.n_left, ground.element_of_point, ground.points, ground.soil_of_point, ground.soils,
-            medium.density_liquid, net.rows, net.geometry, net.neighbours, net.nodes, medium.wave_speed, net.volume,
-            net.level_of_element, finished, net.sums[0], tally.clamps[0], tally.moved_point, tally.moved_from,
-        )  # fmt: skip
-        if removed > 0:
-            for k in range(n_moved):
-                i = tally.moved_point[k]
-                if ground.element_of_point[i] == -1:
-                    tally.measures[REMOVED_MASS] += ground.points[i, MASS]
-        if n_moved > 0:
-            counts[OCCUPIED], counts[ACTIVE] = update_order(
-                ground.element_of_point, tally.moved_point, tally.moved_from, n_moved, ground.start, ground.order,
-                ground.occupied, counts[OCCUPIED], tally.spare_start, tally.spare_order,
+            critical = min(critical, tally.limits[part, 0])
+        courant = clock.times[SMALLEST] / critical
+        tally.measures[LARGEST_COURANT] = max(tally.measures[LARGEST_COURANT], courant)
+        if tally.n_left.sum() > 0:
+            counts[OCCUPIED], counts[ACTIVE], removed = follow_points(
+                tally.left, tally.first_left, tally.n_left, tally.origin, ground.element_of_point, ground.points,
+                ground.soil_of_point, ground.soils, net.volume, ground.start, ground.order, ground.occupied,
+                counts[OCCUPIED], tally.spare_start, tally.spare_order,
             )  # fmt: skip
-            cut_by_points(ground.start, ground.occupied, counts[OCCUPIED], net.element_cuts, cuts.elements)
+            tally.measures[REMOVED_MASS] += removed
+            cut_by_work(ground.start, ground.occupied, counts[OCCUPIED], net.element_cuts, finished + 1, cuts.elements)
 
-    @kernel
-    def long_step(
-        thread, meeting, stage, first_pass, last_pass, advance, ground, net, walls, cuts, clock, medium, tally
+    @kernel_part
+    def finish(ground, net, cuts, clock, tally):
+        """The end of a long step."""
+        follow(ground, net, cuts, clock, net.element_cuts.size - 2, tally)
+        clock.times[NOW] += clock.times[SPAN]
+
+    @kernel_part
+    def plan(number, batch, ground, net, clock, pace, tally):
+        """Begin a long step, if there shall be one more."""
+        counts, times = tally.counts, clock.times
+        enough = number == batch.limits.size
+        if number > 0:
+            enough = enough or counts[SUBSTEPS] >= batch.most_substeps or times[NOW] >= times[END] * ALMOST_ALL
+            enough = enough or counts[POINT_STEPS] >= batch.most_point_steps
+        if not enough:
+            batch.substeps[number], batch.limits[number] = plan_step(
+                clock, pace, tally.limits, ground.start, ground.occupied, counts[OCCUPIED], net.element_cuts,
+                net.level_of_element,
+            )  # fmt: skip
+
+    @kernel_part
+    def substep(
+        thread, meeting, stage, k, first_pass, last_pass, advance, ground, net, walls, cuts, clock, pace, medium, tally
     ):  # fmt: skip
-        """Do what other threads leave of a range of passes of all substeps; `advance` False maps the points only."""
-        parts, mark = net.sums.shape[0], processor_time()
-        for k in range(clock.begun.size):
-            begun, finished = clock.begun[k], clock.finished[k]
-            if first_pass <= SOLVE:
-                part = take_part(meeting, stage, thread, parts)
-                while part >= 0:
+        """A range of passes of substep `k` of the long step; returns the next stage, or -1 where a point went bad."""
+        parts = net.sums.shape[0]
+        begun, finished = clock.begun[k], clock.finished[k]
+        mark = lap(tally.used, SOLVE, thread, 0)
+        if first_pass <= SOLVE:
+            # with them, as the last part: the list of points after the substep before, which nodes do not need
+            more = 1 if k > 0 and last_pass >= FOLLOW else 0
+            part = take_part(meeting, stage, thread, parts + more)
+            while part >= 0:
+                if part < parts:
                     for level in range(begun + 1):
                         solve_nodes(
                             cuts.nodes[level, part], cuts.nodes[level, part + 1], net.which_node, net.next_row,
-                            net.level_of_row, begun, clock.dt_of_level, net.sums, net.tied_means, medium.gravity,
-                            medium.density_liquid, walls.fixed, walls.contact_of_node, walls.normal, walls.active,
-                            walls.friction, walls.velocity, net.nodes, net.status, walls.impulse, tally.ledger[part],
+                            net.level_of_row, begun, clock.dt_of_level, net.touched, net.sums, net.tied_means,
+                            medium.gravity, medium.density_liquid, walls.fixed, walls.contact_of_node, walls.normal,
+                            walls.active, walls.friction, walls.velocity, net.nodes, net.status, walls.impulse,
+                            tally.ledger[part],
                         )  # fmt: skip
-                    part = next_part(meeting, stage, thread, parts)
-                stage = next_stage(meeting, stage, parts)
-                mark = lap(tally.used, SOLVE, thread, mark)
-            if first_pass <= ADVANCE <= last_pass:
-                part = take_part(meeting, stage, thread, parts)
-                while part >= 0:
-                    for level in range(finished + 1):
-                        advance_points(
-                            cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, ground.start,
-                            ground.order, ground.points, ground.soil_of_point, ground.soils, medium.density_liquid,
-                            net.rows, net.geometry, net.nodes, net.tied_means, net.level_of_element,
-                            clock.dt_of_level, clock.flip_of_level, clock.filter_of_level, net.momenta[part],
-                        )  # fmt: skip
-                    part = next_part(meeting, stage, thread, parts)
-                stage = next_stage(meeting, stage, parts)
-                mark = lap(tally.used, ADVANCE, thread, mark)
-            if first_pass <= REMAP <= last_pass:
-                part = take_part(meeting, stage, thread, parts)
-                while part >= 0:
-                    for level in range(finished + 1):
-                        remap_nodes(
-                            cuts.nodes[level, part], cuts.nodes[level, part + 1], net.which_node, net.next_row,
-                            net.level_of_row, finished, clock.dt_of_level, net.momenta, net.sums, net.tied_means,
-                            walls.fixed, walls.contact_of_node, walls.normal, walls.active, walls.velocity, net.nodes,
-                            net.status,
-                        )  # fmt: skip
-                    part = next_part(meeting, stage, thread, parts)
-                stage = next_stage(meeting, stage, parts)
-                mark = lap(tally.used, REMAP, thread, mark)
-            if first_pass <= RATES <= last_pass:
-                part = take_part(meeting, stage, thread, parts)
-                while part >= 0:
-                    for level in range(finished + 1):
-                        element_rates(
-                            cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, net.rows,
-                            net.geometry, net.nodes, net.volume, net.fill, net.rates, net.nodal_means[part],
-                        )  # fmt: skip
-                    part = next_part(meeting, stage, thread, parts)
-                stage = next_stage(meeting, stage, parts)
-                mark = lap(tally.used, RATES, thread, mark)
-            if first_pass <= SMOOTH <= last_pass:
-                part = take_part(meeting, stage, thread, parts)
-                while part >= 0:
-                    for level in range(finished + 1):
-                        first, last = cuts.rows[level, part], cuts.rows[level, part + 1]
-                        smooth_rates(
-                            first, last, net.which_row, net.nodal_means, net.momenta, net.sums, net.nodes, net.fill
-                        )
-                        if net.mirrored.size > 0:
-                            for j in range(first, last):
-                                if net.mirrored[net.which_row[j]]:
-                                    net.nodes[net.which_row[j], V_GX] = 0.0
-                    part = next_part(meeting, stage, thread, parts)
-                stage = next_stage(meeting, stage, parts)
-                mark = lap(tally.used, SMOOTH, thread, mark)
-            if first_pass <= UPDATE <= last_pass:
-                part = take_part(meeting, stage, thread, parts)
-                while part >= 0:
-                    left, suspended, bad, limit, limit_speed = 0, 0, -1, np.inf, 0.0
-                    for level in range(finished + 1):
-                        more, wrong, loose, local, speed = update_points(
-                            cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, ground.start,
-                            ground.order, ground.points, ground.soil_of_point, ground.soils, medium.density_liquid,
-                            medium.bulk_liquid, net.rows, net.geometry, net.nodes, net.rates, net.volume,
-                            net.fill, net.level_of_element, clock.dt_of_level, net.ahead, advance, medium.wave_speed,
-                            ground.element_of_point, tally.clamps[part], net.sums[part], tally.left[part, left:],
-                        )  # fmt: skip
-                        left += more
-                        suspended += loose
-                        bad = wrong if bad < 0 else bad
-                        if local < limit:
-                            limit, limit_speed = local, speed
-                    tally.n_left[part], tally.suspended[part], tally.bad[part] = left, suspended, bad
-                    tally.limits[part, 0], tally.limits[part, 1] = limit, limit_speed
-                    part = next_part(meeting, stage, thread, parts)
-                stage = next_stage(meeting, stage, parts)
+                    mark = lap(tally.used, SOLVE, thread, mark)
+                else:
+                    follow(ground, net, cuts, clock, clock.finished[k - 1], tally)
+                    mark = lap(tally.used, FOLLOW, thread, mark)
+                part = next_part(meeting, stage, thread, parts + more)
+            stage = next_stage(meeting, stage, parts + more)
+            mark = lap(tally.used, SOLVE, thread, mark)
+        if first_pass <= ADVANCE <= last_pass:
+            part = take_part(meeting, stage, thread, parts)
+            while part >= 0:
+                for level in range(finished + 1):
+                    advance_points(
+                        cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, ground.start,
+                        ground.order, ground.points, ground.soil_of_point, ground.soils, medium.density_liquid,
+                        net.rows, net.geometry, net.nodes, net.tied_means, net.level_of_element,
+                        clock.dt_of_level, clock.flip_of_level, clock.filter_of_level, net.touched[part],
+                        net.means[part],
+                    )  # fmt: skip
+                part = next_part(meeting, stage, thread, parts)
+            stage = next_stage(meeting, stage, parts)
+            mark = lap(tally.used, ADVANCE, thread, mark)
+        if first_pass <= REMAP <= last_pass:
+            part = take_part(meeting, stage, thread, parts)
+            while part >= 0:
+                for level in range(finished + 1):
+                    remap_nodes(
+                        cuts.nodes[level, part], cuts.nodes[level, part + 1], net.which_node, net.next_row,
+                        net.level_of_row, finished, clock.dt_of_level, net.touched, net.means, net.sums,
+                        net.tied_means, walls.fixed, walls.contact_of_node, walls.normal, walls.active, walls.velocity,
+                        net.nodes, net.status,
+                    )  # fmt: skip
+                part = next_part(meeting, stage, thread, parts)
+            stage = next_stage(meeting, stage, parts)
+            mark = lap(tally.used, REMAP, thread, mark)
+        if first_pass <= RATES <= last_pass:
+            part = take_part(meeting, stage, thread, parts)
+            while part >= 0:
+                for level in range(finished + 1):
+                    element_rates(
+                        cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, net.rows,
+                        net.geometry, net.nodes, net.volume, net.fill, net.rates, net.means[part],
+                    )  # fmt: skip
+                part = next_part(meeting, stage, thread, parts)
+            stage = next_stage(meeting, stage, parts)
+            mark = lap(tally.used, RATES, thread, mark)
+        if first_pass <= SMOOTH <= last_pass:
+            part = take_part(meeting, stage, thread, parts)
+            while part >= 0:
+                for level in range(finished + 1):
+                    first, last = cuts.rows[level, part], cuts.rows[level, part + 1]
+                    smooth_rates(
+                        first, last, net.which_row, net.touched, net.means, net.sums, net.nodes,
+                        net.fill,
+                    )  # fmt: skip
+                    if net.mirrored.size > 0:
+                        for j in range(first, last):
+                            if net.mirrored[net.which_row[j]]:
+                                net.nodes[net.which_row[j], V_GX] = 0.0
+                part = next_part(meeting, stage, thread, parts)
+            stage = next_stage(meeting, stage, parts)
+            mark = lap(tally.used, SMOOTH, thread, mark)
+        if first_pass <= UPDATE <= last_pass:
+            part = take_part(meeting, stage, thread, parts)
+            while part >= 0:
+                left, suspended, bad, limit, limit_speed = 0, 0, -1, np.inf, 0.0
+                base = points_before(ground, net.element_cuts, cuts.elements, finished, part)
+                for level in range(finished + 1):
+                    more, wrong, loose, local, speed = update_points(
+                        cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, ground.start,
+                        ground.order, ground.points, ground.soil_of_point, ground.soils, medium.density_liquid,
+                        medium.bulk_liquid, net.rows, net.geometry, net.nodes, net.rates, net.volume,
+                        net.fill, net.level_of_element, clock.dt_of_level, clock.ahead, advance, pace.wave_speed,
+                        ground.element_of_point, tally.clamps[part], net.touched[part], net.sums[part],
+                        tally.left[base + left :],
+                    )  # fmt: skip
+                    left += more
+                    suspended += loose
+                    bad = wrong if bad < 0 else bad
+                    if local < limit:
+                        limit, limit_speed = local, speed
+                tally.first_left[part], tally.n_left[part] = base, left
+                tally.suspended[part], tally.bad[part] = suspended, bad
+                tally.limits[part, 0], tally.limits[part, 1] = limit, limit_speed
                 mark = lap(tally.used, UPDATE, thread, mark)
-            if last_pass >= FOLLOW:
-                part = take_part(meeting, stage, thread, parts)
+                if bad < 0:
+                    tally.limits[parts + part, 0], tally.limits[parts + part, 1] = locate(
+                        tally.left[base:], left, tally.origin[base:], ground.element_of_point, ground.points,
+                        ground.soil_of_point, ground.soils, medium.density_liquid, net.rows, net.geometry,
+                        net.neighbours, net.nodes, pace.wave_speed, net.level_of_element, finished,
+                        net.touched[part], net.sums[part], tally.clamps[part],
+                    )  # fmt: skip
+                mark = lap(tally.used, LOCATE, thread, mark)
+                part = next_part(meeting, stage, thread, parts)
+            stage = next_stage(meeting, stage, parts)
+            mark = lap(tally.used, UPDATE, thread, mark)
+            if tally.bad.max() >= 0:
+                return -1
+        return stage
+
+    @kernel
+    def long_step(
+        thread, meeting, stage, first_pass, last_pass, advance, batch, ground, net, walls, cuts, clock, pace, medium,
+        tally,
+    ):  # fmt: skip
+        """Do what other threads leave of a range of passes of all substeps; `advance` False maps the points only."""
+        for number in range(batch.substeps.size):
+            mark = lap(tally.used, PLAN, thread, 0)
+            if first_pass == PLAN:
+                part = take_part(meeting, stage, thread, 1)
                 while part >= 0:
-                    if part == 0:
-                        tally.counts[SUBSTEPS] += 1
-                        tally.counts[POINT_STEPS] += ground.start[net.element_cuts[finished + 1]]
-                        follow(ground, net, cuts, medium, clock, finished, tally)
-                    part = next_part(meeting, stage, thread, parts)
-                stage = next_stage(meeting, stage, parts)
-                mark = lap(tally.used, FOLLOW, thread, mark)
-                if tally.counts[BAD] >= 0:
+                    if number > 0:
+                        finish(ground, net, cuts, clock, tally)
+                        mark = lap(tally.used, FOLLOW, thread, mark)
+                    plan(number, batch, ground, net, clock, pace, tally)
+                    part = next_part(meeting, stage, thread, 1)
+                stage = next_stage(meeting, stage, 1)
+                lap(tally.used, PLAN, thread, mark)
+            if last_pass == PLAN:
+                return
+            for k in range(batch.substeps[number]):
+                stage = substep(
+                    thread, meeting, stage, k, first_pass, last_pass, advance, ground, net, walls, cuts, clock, pace,
+                    medium, tally,
+                )  # fmt: skip
+                if stage < 0:
                     return
+            if batch.substeps[number] == 0 or last_pass < FOLLOW:
+                return
+        # the last one of those that were not planned here
+        mark = lap(tally.used, FOLLOW, thread, 0)
+        part = take_part(meeting, stage, thread, 1)
+        while part >= 0:
+            finish(ground, net, cuts, clock, tally)
+            part = next_part(meeting, stage, thread, 1)
+        stage = next_stage(meeting, stage, 1)
+        lap(tally.used, FOLLOW, thread, mark)
 
     return long_step

@@ -1,8 +1,9 @@
 """How the threads of a compiled kernel share its stages: a few atomic instructions, no lock and no interpreter.
 
-A kernel is a row of stages, each of as many parts as the mesh has. A thread does what parts of a stage it can get, its
-own first, and goes on when all are done, by whomever: where the machine has other work and a thread is not running,
+A kernel is a row of stages, each of some parts. A thread does what parts of a stage it can get, the first or the last
+ones first, and goes on when all are done, by whomever: where the machine has other work and a thread is not running,
 the others do its parts. They wait only for a part that is begun, some eighty microseconds at once and then asleep.
+Stages are numbered by the parts of all stages before them.
 """
 
 from llvmlite import ir
@@ -19,9 +20,17 @@ LINE = 16  # numbers from one counter to the next, so that each is in a cache li
 fall_asleep = types.ExternalFunction("usleep", types.int32(types.uint32))  # POSIX
 
 
-def meeting_width(parts):
-    """Length of the int64 array, zeros at first, in which threads agree: stages begun of each part, then parts done."""
-    return LINE * (parts + 1)
+def meeting_width(most_parts):
+    """Length of the int64 array, zeros at first, in which threads agree on stages of up to so many parts.
+
+    One counter a part, above the number of the last stage in which it was begun; then that of parts done.
+    """
+    return LINE * (most_parts + 1)
+
+
+def stage_at_hand(meeting):
+    """Number of the stage that comes next, when no thread is in one."""
+    return int(meeting[-LINE])
 
 
 @intrinsic
@@ -65,10 +74,11 @@ def _pointer(context, builder, array_type, array, place):
 
 @kernel_part
 def take_part(meeting, stage, thread, parts):
-    """A part of the stage that nobody has begun, or -1."""
+    """A part of the stage that nobody has begun, or -1; threads of odd number look from the last one on."""
     for k in range(parts):
-        part = (thread + k) % parts
-        if exchange_atomic(meeting, LINE * part, stage, stage + 1):
+        part = parts - 1 - k if thread % 2 else k
+        begun = load_atomic(meeting, LINE * part)
+        if begun <= stage and exchange_atomic(meeting, LINE * part, begun, stage + 1):
             return part
     return -1
 
@@ -76,7 +86,7 @@ def take_part(meeting, stage, thread, parts):
 @kernel_part
 def next_part(meeting, stage, thread, parts):
     """Say that a part is done, and take another one as `take_part`."""
-    add_atomic(meeting, LINE * parts, 1)
+    add_atomic(meeting, meeting.size - LINE, 1)
     return take_part(meeting, stage, thread, parts)
 
 
@@ -84,8 +94,8 @@ def next_part(meeting, stage, thread, parts):
 def next_stage(meeting, stage, parts):
     """Wait until all parts of the stage are done; returns the number of the stage that follows."""
     spins = 0
-    while load_atomic(meeting, LINE * parts) < (stage + 1) * parts:
+    while load_atomic(meeting, meeting.size - LINE) < stage + parts:
         spins += 1
         if spins > SPINS:
             fall_asleep(PAUSE)
-    return stage + 1
+    return stage + parts

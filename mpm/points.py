@@ -5,9 +5,11 @@ from functools import cache
 
 import numpy as np
 
-from mpm.jit import kernel, kernel_part
+from mpm.jit import LINE, index, kernel, kernel_part
 from mpm.transfer import map_kernel
-from mpm.variables import C_RETURNED, MASS, POINT_WIDTH, SXX, SYY, SZZ, X0, Y0, N, P, X, Y
+from mpm.variables import C_RETURNED, MASS, POINT_WIDTH, S_RHO_S, SXX, SYY, SZZ, X0, Y0, N, P, X, Y
+
+ELEMENT_WORK = 2  # what an element costs in a step beside its points, in points
 
 
 def barycentric_layout(count):
@@ -44,6 +46,15 @@ def barycentric_layout(count):
             points = [np.array(b) @ np.array(c) / k for c in corners for b in local]
             return np.array([[1 - p[0] - p[1], p[0], p[1]] for p in points])
     raise ValueError(f"points_per_element must be k^2, 3 k^2 or 6, got {count}; use 3, 4, 6 or 12")
+
+
+def on_cache_lines(rows):
+    """Copy of an array (n, k) of float64 whose first row begins with a cache line; so do all where k is 8, 16, ..."""
+    memory = np.empty(rows.nbytes + LINE, np.uint8)
+    first = -memory.ctypes.data % LINE
+    copy = memory[first : first + rows.nbytes].view(np.float64).reshape(rows.shape)
+    copy[:] = rows
+    return copy
 
 
 def fill(mesh, scene):
@@ -97,7 +108,7 @@ def fill(mesh, scene):
     points = np.concatenate(parts)
     element_of_point = np.concatenate(owner).astype(np.int32)
     by_element = np.argsort(element_of_point, kind="stable")
-    points, element_of_point = np.ascontiguousarray(points[by_element]), element_of_point[by_element]
+    points, element_of_point = on_cache_lines(points[by_element]), element_of_point[by_element]
     soil_of_point = soil_of_element[element_of_point].astype(np.int32)
     points[:, X0 : Y0 + 1] = points[:, X : Y + 1]
     vertical, pressure = initial_stress(scene, -points[:, Y])
@@ -167,175 +178,264 @@ def sort_by_element(element_of_point, n_elements, start, order, occupied):
 
 
 @kernel
-def cut_by_points(start, occupied, n_occupied, element_cuts, cuts):
-    """Cut the occupied elements of each level into parts of about as many points.
+def porosity_ranges(points, element_of_point, soil_of_point, n_soils):
+    """Smallest and largest porosity of the points of each soil that are in an element: (n_soils, 2), else inf, -inf."""
+    ranges = np.empty((n_soils, 2))
+    ranges[:, 0], ranges[:, 1] = np.inf, -np.inf
+    for i in range(element_of_point.size):
+        if element_of_point[i] >= 0:
+            s = soil_of_point[i]
+            ranges[s, 0] = min(ranges[s, 0], points[i, N])
+            ranges[s, 1] = max(ranges[s, 1], points[i, N])
+    return ranges
+
+
+@kernel
+def mass_inside(points, element_of_point, x, y, radius):
+    """Grains of the points in elements that are inside of a circle [kg/m]; x, y, radius : float [m]."""
+    total = 0.0
+    for i in range(element_of_point.size):
+        if element_of_point[i] >= 0 and (points[i, X] - x) ** 2 + (points[i, Y] - y) ** 2 < radius**2:
+            total += points[i, MASS]
+    return total
+
+
+@kernel
+def cut_by_work(start, occupied, n_occupied, element_cuts, n_levels, cuts):
+    """Cut the occupied elements of the finest levels into parts of about as much work.
 
     Parameters
     ----------
     element_cuts : (n_levels + 1,) int
         First element of each level.
     cuts : (n_levels, n_parts + 1) int64
-        Written: places in the list of occupied elements.
+        Written: places in the list of occupied elements; those of further levels are shifted with it.
     """
-    held = occupied[:n_occupied]
     parts = cuts.shape[1] - 1
-    for level in range(cuts.shape[0]):
-        first, last = element_cuts[level], element_cuts[level + 1]
-        count = start[last] - start[first]
-        for part in range(parts):
-            sought = start[first] + part * count // parts
-            element = first + np.searchsorted(start[first : last + 1], sought, side="right") - 1
-            cuts[level, part] = np.searchsorted(held, element)
-        cuts[level, parts] = np.searchsorted(held, last)
+    change = n_occupied - cuts[-1, -1]
+    for level in range(n_levels, cuts.shape[0]):
+        for part in range(parts + 1):
+            cuts[level, part] += change
+    end = 0
+    for level in range(n_levels):
+        begin, after = start[element_cuts[level]], start[element_cuts[level + 1]]
+        first = end
+        end = np.searchsorted(occupied[:n_occupied], element_cuts[level + 1])
+        work = after - begin + ELEMENT_WORK * (end - first)
+        cuts[level, 0] = low = first
+        for part in range(1, parts):
+            high = end
+            while low < high:
+                middle = (low + high) // 2
+                before = start[occupied[middle]] - begin + ELEMENT_WORK * (middle - first)
+                if before * parts < part * work:
+                    low = middle + 1
+                else:
+                    high = middle
+            cuts[level, part] = low
+        cuts[level, parts] = end
+
+
+@kernel_part
+def shift_ranges(array, spare, ranges, count):
+    """Move ranges of an array, which stay in their order, by so many places each.
+
+    ranges : (n, 3) int64
+        First and last place (exclusive) and shift of the first `count` ranges, ascending.
+    spare : as `array`.
+    """
+    # What moves down never lands on what has yet to move up, nor the other way round.
+    for k in range(count):
+        if ranges[k, 2] < 0:
+            shift_range(array, spare, ranges[k, 0], ranges[k, 1], ranges[k, 2])
+    for k in range(count - 1, -1, -1):
+        if ranges[k, 2] > 0:
+            shift_range(array, spare, ranges[k, 0], ranges[k, 1], ranges[k, 2])
+
+
+@kernel_part
+def shift_range(array, spare, first, last, shift):
+    """Move one range of an array; by way of another array, so that copying is not slowed by what overlaps."""
+    for j in range(first, last):
+        spare[index(j)] = array[index(j)]
+    for j in range(first, last):
+        array[index(j + shift)] = spare[index(j)]
 
 
 @kernel
 def update_order(
-    element_of_point, moved_point, moved_from, n_moved, start, order, occupied, n_occupied, new_start, new_order
+    element_of_point, moved_point, moved_from, n_moved, start, order, occupied, n_occupied, spare_start, spare_order
 ):
-    """Repair the sorting by element in place after a few points have moved, copying what lies between their elements.
+    """Repair the sorting by element in place after a few points have moved, shifting what lies between their elements.
 
-    Equal to `sort_by_element` to the last entry, at the cost of a copy.
+    Equal to `sort_by_element` to the last entry.
 
     moved_point, moved_from : (n,) int32
         The first n_moved entries: points, ascending, and the elements that they have left.
-    new_start, new_order
-        As `start` and `order`, for what is being sorted.
+    spare_start, spare_order
+        As `start` and `order`, for copies on the way.
     Returns the number of occupied elements and of points.
     """
     n_elements = start.size - 1
-    touched = np.zeros(2 * n_moved, np.int32)
-    n_touched = 0
-    gone = 0
+    touched, n_touched = np.empty(2 * n_moved, np.int32), 0
     for k in range(n_moved):
         touched[n_touched] = moved_from[k]
         n_touched += 1
-        e = element_of_point[moved_point[k]]
-        if e >= 0:
-            touched[n_touched] = e
+        if element_of_point[moved_point[k]] >= 0:
+            touched[n_touched] = element_of_point[moved_point[k]]
             n_touched += 1
-        else:
-            gone += 1
     touched = touched[:n_touched]
     touched.sort()
-    stayed = np.zeros((n_touched + 1, 2), np.int32)  # ranges of `order` between touched elements that stay in place
-    n_stayed = 0
-    # elements outside of these keep their points where they are, unless some are gone
-    lowest, highest = touched[0], n_elements if gone > 0 else touched[-1] + 1
-    for e in range(lowest, highest):
-        new_start[e + 1] = start[e + 1] - start[e]
-    for k in range(n_moved):
-        new_start[moved_from[k] + 1] -= 1
-        e = element_of_point[moved_point[k]]
-        if e >= 0:
-            new_start[e + 1] += 1
-    arriving = np.argsort(element_of_point[moved_point[:n_moved]], kind="mergesort")
-    read = write = start[lowest]  # everything of `order` between them is already copied or dropped
-    a = 0
-    last = -1
+    n_touched, n_held = 0, 0
     for e in touched:
-        if e == last:
-            continue
-        last = e
-        if read == write:
-            stayed[n_stayed, 0], stayed[n_stayed, 1] = read, start[e]
-            n_stayed += 1
-            write = start[e]
-        else:
-            for j in range(read, start[e]):
-                new_order[write] = order[j]
-                write += 1
-        read = start[e]
+        if n_touched == 0 or e != touched[n_touched - 1]:
+            touched[n_touched] = e
+            n_touched += 1
+            n_held += start[e + 1] - start[e]
+    # the new lists of these elements, one after the other
+    held, n_new = np.empty(n_held + n_moved, np.int32), 0
+    arriving, a = np.argsort(element_of_point[moved_point[:n_moved]], kind="mergesort"), 0
+    ends = np.empty(n_touched, np.int64)
+    for t in range(n_touched):
+        e = touched[t]
         while a < n_moved and element_of_point[moved_point[arriving[a]]] < e:
             a += 1
-        while read < start[e + 1] or (a < n_moved and element_of_point[moved_point[arriving[a]]] == e):
+        read = start[e]
+        while True:
             incoming = a < n_moved and element_of_point[moved_point[arriving[a]]] == e
             if read < start[e + 1] and (not incoming or order[read] < moved_point[arriving[a]]):
                 i = order[read]
                 read += 1
                 if element_of_point[i] == e:
-                    new_order[write] = i
-                    write += 1
-            else:
+                    held[n_new] = i
+                    n_new += 1
+            elif incoming:
                 i = moved_point[arriving[a]]
                 a += 1
                 if read < start[e + 1] and order[read] == i:
                     read += 1  # it left and came back within the search
-                new_order[write] = i
-                write += 1
-    for j in range(read, start[highest]):
-        new_order[write] = order[j]
-        write += 1
-    held = occupied[:n_occupied]
-    first, after = np.searchsorted(held, lowest), np.searchsorted(held, highest)
-    filled = 0
-    for e in range(lowest, highest):
-        if new_start[e + 1] > 0:
-            filled += 1
-    change = first + filled - after
-    if change > 0:
-        for k in range(n_occupied - 1, after - 1, -1):
-            occupied[k + change] = occupied[k]
-    elif change < 0:
-        for k in range(after, n_occupied):
-            occupied[k + change] = occupied[k]
-    copied = start[lowest]
-    for k in range(n_stayed):
-        for j in range(copied, stayed[k, 0]):
-            order[j] = new_order[j]
-        copied = stayed[k, 1]
-    for j in range(copied, write):
-        order[j] = new_order[j]
-    for e in range(lowest, highest):
-        if new_start[e + 1] > 0:
-            occupied[first] = e
-            first += 1
-        start[e + 1] = start[e] + new_start[e + 1]
+                held[n_new] = i
+                n_new += 1
+            else:
+                break
+        ends[t] = n_new
+    # what lies between them, and the elements that are occupied from now on or no more
+    ranges, shift = np.empty((n_touched, 3), np.int64), 0
+    places, n_places, change = np.empty((n_touched, 3), np.int64), 0, 0
+    entering = np.empty(n_touched, np.int64)
+    for t in range(n_touched):
+        e = touched[t]
+        count, before = ends[t] - (ends[t - 1] if t > 0 else 0), start[e + 1] - start[e]
+        shift += count - before
+        ranges[t, 0], ranges[t, 2] = start[e + 1], shift
+        ranges[t, 1] = start[touched[t + 1]] if t + 1 < n_touched else start[n_elements]
+        if (count > 0) != (before > 0):
+            place = np.searchsorted(occupied[:n_occupied], e)
+            if n_places > 0:
+                places[n_places - 1, 1] = place
+            change += 1 if count > 0 else -1
+            places[n_places, 0], places[n_places, 1], places[n_places, 2] = place + (before > 0), n_occupied, change
+            entering[n_places] = e if count > 0 else -1
+            n_places += 1
+    shift_ranges(order, spare_order, ranges, n_touched)
+    shift_ranges(occupied, spare_start, places, n_places)
+    for k in range(n_places):
+        if entering[k] >= 0:
+            occupied[places[k, 0] + places[k, 2] - 1] = entering[k]
+    k = 0
+    for t in range(n_touched):
+        e = touched[t]
+        j = start[e]
+        while k < ends[t]:
+            order[j] = held[k]
+            j, k = j + 1, k + 1
+        last = touched[t + 1] if t + 1 < n_touched else n_elements
+        if ranges[t, 2] != 0:
+            for f in range(e + 1, last + 1):
+                start[index(f)] += ranges[t, 2]
     return n_occupied + change, start[n_elements]
 
 
+@kernel_part
+def follow_points(
+    left, first_left, n_left, origin, element_of_point, points, soil_of_point, soils, volume, start, order, occupied,
+    n_occupied, spare_start, spare_order,
+):  # fmt: skip
+    """Count the points that `locate` has found with the elements that hold them, and repair the sorting.
+
+    left, origin : (n_points,) int32
+        Those of each part from `first_left` on, `n_left` (n_parts,) int64 of them.
+    volume : (n_elements, 2) float64
+        Added: volumes of these points, and of those under pore pressure [m2].
+    Others as of `locate` and `update_order`.
+
+    Returns
+    -------
+    n_occupied, n_active : int
+        Number of occupied elements and of points in them.
+    removed : float
+        Grains taken out [kg/m].
+    """
+    found = n_left.sum()
+    moved_point, moved_from = np.empty(found, np.int32), np.empty(found, np.int32)
+    n_moved, removed = 0, 0.0
+    for part in range(n_left.size):
+        for k in range(first_left[part], first_left[part] + n_left[part]):
+            i = left[k]
+            e = element_of_point[i]
+            if e >= 0:
+                added = points[i, MASS] / (soils[soil_of_point[i], S_RHO_S] * (1.0 - points[i, N]))
+                volume[e, 0] += added
+                if points[i, P] > 0.0:
+                    volume[e, 1] += added
+            else:
+                removed += points[i, MASS]
+            if e != origin[k]:
+                moved_point[n_moved], moved_from[n_moved] = i, origin[k]
+                n_moved += 1
+    if n_moved == 0:
+        return n_occupied, start[start.size - 1], removed
+    ascending = np.argsort(moved_point[:n_moved])
+    n_occupied, n_active = update_order(
+        element_of_point, moved_point[ascending], moved_from[ascending], n_moved, start, order, occupied, n_occupied,
+        spare_start, spare_order,
+    )  # fmt: skip
+    return n_occupied, n_active, removed
+
+
 @cache
-def relocate_kernel(wet, undrained, tied):
-    """Kernel `relocate` for points with pore water or without, on levels tied to each other or on one."""
+def locate_kernel(wet, undrained, tied):
+    """Kernel `locate` for points with pore water or without, on levels tied to each other or on one."""
     map_point = map_kernel(wet, undrained, tied)
 
     @kernel_part
-    def relocate(
-        left, n_left, element_of_point, points, soil_of_point, soils, density_liquid, rows, geometry, neighbours,
-        nodes, wave_speed, volume, level_of_element, finished, sums, clamps, moved_point, moved_from,
+    def locate(
+        left, n_left, origin, element_of_point, points, soil_of_point, soils, density_liquid, rows, geometry,
+        neighbours, nodes, wave_speed, level_of_element, finished, touched, sums, clamps,
     ):  # fmt: skip
         """Find the new element of every point that left its own, walking over neighbours, and map it there.
 
         A point that would cross the boundary of the mesh is put back on it (and counted); one that
         crosses an outflow edge (neighbour -2) is taken out: element -1. A point on its way to an element of a
         level above `finished`, whose step is not over, waits in its own as if on the edge.
+        It may be called for a part of the points while others are updated; `follow_points` does the rest.
 
-        left, n_left : (n_parts, n_points) int32, (n_parts,) int64
+        left, n_left : (n_points,) int32, int
             Points that left their element, of `update_points`, and how many.
-        moved_point, moved_from : (n_points,) int32
-            Written: the points that changed their element, ascending, and the elements that they left.
+        origin : (n_points,) int32
+            Written: the elements that they left.
 
         Returns
         -------
-        n_moved, removed : int
-            Number of points that changed their element, and of points taken out.
         limit, limit_speed : float
-            As of `update_points`, over the points relocated.
+            As of `update_points`, over these points.
         """
         limit = np.inf
         limit_speed = 0.0
-        removed = 0
-        n_moved = 0
-        found = 0
-        for part in range(left.shape[0]):
-            for k in range(n_left[part]):
-                moved_point[found] = left[part, k]
-                found += 1
-        moved_point[:found].sort()
-        for k in range(found):
-            i = moved_point[k]
+        for k in range(n_left):
+            i = left[k]
             e = -2 - element_of_point[i]
-            origin = e
+            origin[k] = e
             for _ in range(10000):
                 g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
                 dx = points[i, X] - geometry[e, 4]
@@ -366,7 +466,6 @@ def relocate_kernel(wet, undrained, tied):
                     continue
                 if following == -2:
                     e = -1
-                    removed += 1
                     break
                 n0, n1, n2 = max(n0, 1e-9), max(n1, 1e-9), max(n2, 1e-9)
                 total = n0 + n1 + n2
@@ -378,24 +477,18 @@ def relocate_kernel(wet, undrained, tied):
                 clamps[C_RETURNED] += 1
                 break
             if tied and e >= 0 and level_of_element[e] > finished:
-                e = origin
+                e = origin[k]
             element_of_point[i] = e
-            if e != origin:
-                moved_point[n_moved] = i
-                moved_from[n_moved] = origin
-                n_moved += 1
             if e >= 0:
-                added, fastest = map_point(
-                    points[i], soils[soil_of_point[i]], density_liquid, rows[e], geometry[e], nodes, sums
+                fastest = np.sqrt(
+                    map_point(
+                        points[i], soils[soil_of_point[i]], density_liquid, rows[e], geometry[e], nodes, touched, sums
+                    )
                 )
-                volume[e, 0] += added
-                if points[i, P] > 0.0:
-                    volume[e, 1] += added
-                fastest = np.sqrt(fastest)
                 local = geometry[e, 7] / ((wave_speed + fastest) * (1 << level_of_element[e]))
                 if local < limit:
                     limit = local
                     limit_speed = fastest
-        return n_moved, removed, limit, limit_speed
+        return limit, limit_speed
 
-    return relocate
+    return locate

@@ -138,8 +138,8 @@ class Simulation:
         if stop.time is not None:
             end = min(end, stop.time)
         while solver.time < end * (1 - 1e-12) and not self._reached:
-            _, limit = solver.step(end - solver.time)
-            self._limits[limit] = self._limits.get(limit, 0) + 1
+            for limit in solver.advance(end, self._checked + STEPS_BETWEEN_CHECKS - solver.step_count):
+                self._limits[limit] = self._limits.get(limit, 0) + 1
             if solver.step_count - self._checked >= STEPS_BETWEEN_CHECKS:
                 self._checked = solver.step_count
                 self._inflow = solver.inflow_mass()

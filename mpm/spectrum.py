@@ -30,7 +30,8 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm.contact import FIXED_X, FIXED_Y, free_pair
-from mpm.jit import kernel, kernel_part
+from mpm.jit import index, kernel, kernel_part
+from mpm.long_step import Ground, Medium
 from mpm.meeting import next_part, next_stage, take_part
 from mpm.transfer import spread_volume
 from mpm.variables import MASS, S_DRAG, S_G, S_LAMBDA, S_RHO_S, S_SIN_DIL, N, X, Y
@@ -48,10 +49,36 @@ ROUNDS = 3  # of the step that the drag depends on, from below, at the first cal
 E_GRAINS, E_WATER, ELEMENT_WIDTH = 7, 13, 19
 
 
-@kernel
+class Operator(NamedTuple):
+    """What the largest eigenvalue is sought of, and arrays for the way there; those of parts are zeros between uses."""
+
+    elements: np.ndarray
+    rows: np.ndarray
+    geometry: np.ndarray
+    stiffened: np.ndarray
+    fixed: np.ndarray
+    step_of_node: np.ndarray
+    undrained: bool
+    smoothing: bool
+    remapping: bool
+    held: np.ndarray
+    nodal: np.ndarray
+    fill: np.ndarray
+    per_volume: np.ndarray  # (n_rows, 2) one over volume and spread volume around a row, 0 where there is none
+    free: np.ndarray  # (n_nodes, 2) bool
+    element_cuts: np.ndarray  # (n_parts + 1,) as the others; of the occupied elements
+    row_cuts: np.ndarray
+    node_cuts: np.ndarray
+    at_nodes: np.ndarray  # (n_parts, n_nodes, 4) what parts sum there, one after the other: masses, forces, momenta
+    at_rows: np.ndarray  # (n_parts, n_rows, 2) volumes, divergences
+    divergence: np.ndarray  # (n_rows, 2)
+    acceleration: np.ndarray  # (n_nodes, 4 or 2)
+    dots: np.ndarray  # (n_parts, KRYLOV + 1)
+
+
+@kernel_part
 def sum_points(
-    first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, bulk_liquid, elements, rows,
-    geometry, stiffened, undrained, held, nodal, row_volume,
+    first, last, ground, medium, elements, rows, geometry, stiffened, undrained, held, nodal, row_volume
 ):  # fmt: skip
     """Sum the points of a range of elements in these and at the nodes.
 
@@ -59,25 +86,28 @@ def sum_points(
         Factor of the stiffness of an element.
     undrained : bool
         The pore water moves with the grains: its mass counts as theirs.
-    held : (n_occupied, 19) float64
-        Written: see the columns `E_`.
+    held : (n_elements, 19) float64
+        Written, the occupied elements one after the other: see the columns `E_`.
     nodal : (n_nodes, 4) float64
         Added: masses of grains, of water as if it filled all, of pore water [kg/m]; drag [kg/m/s].
-    row_volume : (n_rows,) float64
-        Added: volume of the elements around [m2].
+    row_volume : (n_rows, 2) float64
+        Added: volume and area of the elements around [m2].
     """
+    points, soils = ground.points, ground.soils
     for k in range(first, last):
-        e = occupied[k]
-        held[k] = 0.0
-        for j in range(start[e], start[e + 1]):
-            i = order[j]
-            s = soil_of_point[i]
+        e = index(ground.occupied[k])
+        for column in range(ELEMENT_WIDTH):
+            held[k, column] = 0.0
+        g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
+        for j in range(ground.start[e], ground.start[e + 1]):
+            i = index(ground.order[j])
+            s = index(ground.soil_of_point[i])
             dx, dy = points[i, X] - geometry[e, 4], points[i, Y] - geometry[e, 5]
-            n1, n2 = geometry[e, 0] * dx + geometry[e, 1] * dy, geometry[e, 2] * dx + geometry[e, 3] * dy
+            n1, n2 = g1x * dx + g1y * dy, g2x * dx + g2y * dy
             weight = (1.0 - n1 - n2, n1, n2)
             mass, n = points[i, MASS], points[i, N]
             volume = mass / (soils[s, S_RHO_S] * (1.0 - n))
-            water = volume * density_liquid
+            water = volume * medium.density_liquid
             stiff = volume * stiffened[e]
             if undrained:
                 mass += n * water
@@ -86,39 +116,94 @@ def sum_points(
                 held[k, E_OWN] += volume
             held[k, E_LAMBDA] += stiff * soils[s, S_LAMBDA]
             held[k, E_G] += stiff * soils[s, S_G]
-            held[k, E_QS] += stiff * bulk_liquid * (1.0 - n) / n
-            held[k, E_QL] += stiff * bulk_liquid
+            held[k, E_QS] += stiff * medium.bulk_liquid * (1.0 - n) / n
+            held[k, E_QL] += stiff * medium.bulk_liquid
             column = 0
             for a in range(3):
                 for b in range(a, 3):
                     held[k, E_GRAINS + column] += mass * weight[a] * weight[b]
                     held[k, E_WATER + column] += water * weight[a] * weight[b]
                     column += 1
-                c = elements[e, a]
+                c = index(elements[e, a])
                 nodal[c, 0] += weight[a] * mass
                 nodal[c, 1] += weight[a] * water
                 nodal[c, 2] += weight[a] * n * water
                 nodal[c, 3] += weight[a] * n * water * soils[s, S_DRAG]
         held[k, E_OWN] /= held[k, E_V]
         for a in range(3):
-            row_volume[rows[e, a]] += held[k, E_V]
+            r = index(rows[e, a])
+            row_volume[r, 0] += held[k, E_V]
+            row_volume[r, 1] += geometry[e, 6]
 
 
-@kernel
-def spread_elements(first, last, occupied, rows, geometry, fill, held, row_spread):
+@kernel_part
+def spread_elements(first, last, occupied, rows, geometry, fill, held, row_volume):
     """Spread the volumes of a range of elements as the step does (`mpm.transfer.spread_volume`); sums them at the rows.
 
-    fill, row_spread : (n_rows,) float64
-        Volume over area of the elements around a row; added: spread volumes [m2].
+    fill, row_volume : (n_rows,), (n_rows, 2) float64
+        Volume over area of the elements around a row; added to its first column: spread volumes [m2].
     """
     for k in range(first, last):
-        e = occupied[k]
-        a, b, c = rows[e, 0], rows[e, 1], rows[e, 2]
+        e = index(occupied[k])
+        a, b, c = index(rows[e, 0]), index(rows[e, 1]), index(rows[e, 2])
         spread = spread_volume(held[k, E_V], geometry[e, 6], fill[a], fill[b], fill[c])
         held[k, E_SPREAD] = spread / held[k, E_V]
-        row_spread[a] += spread
-        row_spread[b] += spread
-        row_spread[c] += spread
+        row_volume[a, 0] += spread
+        row_volume[b, 0] += spread
+        row_volume[c, 0] += spread
+
+
+@kernel_part
+def gather(thread, meeting, stage, ground, medium, o):
+    """Set the operator up for the points as they are; returns the next stage."""
+    parts = o.at_nodes.shape[0]
+    part = take_part(meeting, stage, thread, parts)
+    while part >= 0:
+        sum_points(
+            o.element_cuts[part], o.element_cuts[part + 1], ground, medium, o.elements, o.rows, o.geometry, o.stiffened,
+            o.undrained, o.held, o.at_nodes[part], o.at_rows[part],
+        )  # fmt: skip
+        part = next_part(meeting, stage, thread, parts)
+    stage = next_stage(meeting, stage, parts)
+    part = take_part(meeting, stage, thread, parts)
+    while part >= 0:
+        for i in range(o.node_cuts[part], o.node_cuts[part + 1]):
+            for column in range(4):
+                total = 0.0
+                for p in range(parts):
+                    total += o.at_nodes[p, i, column]
+                    o.at_nodes[p, i, column] = 0.0
+                o.nodal[i, column] = total
+            o.free[i, 0] = o.nodal[i, 0] > 0.0 and not o.fixed[i] & FIXED_X
+            o.free[i, 1] = o.nodal[i, 0] > 0.0 and not o.fixed[i] & FIXED_Y
+        for r in range(o.row_cuts[part], o.row_cuts[part + 1]):
+            volume = area = 0.0
+            for p in range(parts):
+                volume += o.at_rows[p, r, 0]
+                area += o.at_rows[p, r, 1]
+                o.at_rows[p, r, 0] = o.at_rows[p, r, 1] = 0.0
+            o.fill[r] = volume / area if area > 0.0 else 0.0
+            o.per_volume[r, 0] = 1.0 / volume if volume > 0.0 else 0.0
+        part = next_part(meeting, stage, thread, parts)
+    stage = next_stage(meeting, stage, parts)
+    part = take_part(meeting, stage, thread, parts)
+    while part >= 0:
+        spread_elements(
+            o.element_cuts[part], o.element_cuts[part + 1], ground.occupied, o.rows, o.geometry, o.fill, o.held,
+            o.at_rows[part],
+        )  # fmt: skip
+        part = next_part(meeting, stage, thread, parts)
+    stage = next_stage(meeting, stage, parts)
+    part = take_part(meeting, stage, thread, parts)
+    while part >= 0:
+        for r in range(o.row_cuts[part], o.row_cuts[part + 1]):
+            volume = 0.0
+            for p in range(parts):
+                volume += o.at_rows[p, r, 0]
+                o.at_rows[p, r, 0] = 0.0
+            o.per_volume[r, 1] = 1.0 / volume if volume > 0.0 else 0.0
+        part = next_part(meeting, stage, thread, parts)
+    return next_stage(meeting, stage, parts)
 
 
 @kernel_part
@@ -126,8 +211,8 @@ def sum_divergences(first, last, occupied, elements, rows, geometry, held, veloc
     """Add the divergences of the grains and of the water relative to them, times volumes, to rows: (n_rows, 2)."""
     wet = velocity.shape[1] == 4
     for k in range(first, last):
-        e = occupied[k]
-        a, b, c = elements[e, 0], elements[e, 1], elements[e, 2]
+        e = index(occupied[k])
+        a, b, c = index(elements[e, 0]), index(elements[e, 1]), index(elements[e, 2])
         before, weight = 0.0, held[k, E_V]
         for phase in range(2 if wet else 1):
             x, y = 2 * phase, 2 * phase + 1
@@ -138,7 +223,7 @@ def sum_divergences(first, last, occupied, elements, rows, geometry, held, veloc
                 velocity[c, y] - velocity[a, y]
             )
             for corner in range(3):
-                divergence[rows[e, corner], phase] += weight * (rate - before)
+                divergence[index(rows[e, corner]), phase] += weight * (rate - before)
             before, weight = rate, held[k, E_V] * held[k, E_SPREAD]
 
 
@@ -154,8 +239,8 @@ def sum_forces(first, last, occupied, elements, rows, geometry, held, velocity, 
     wet = velocity.shape[1] == 4
     third = 1.0 / 3.0
     for k in range(first, last):
-        e = occupied[k]
-        a, b, c = elements[e, 0], elements[e, 1], elements[e, 2]
+        e = index(occupied[k])
+        a, b, c = index(elements[e, 0]), index(elements[e, 1]), index(elements[e, 2])
         g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
         ux1, ux2 = velocity[b, 0] - velocity[a, 0], velocity[c, 0] - velocity[a, 0]
         uy1, uy2 = velocity[b, 1] - velocity[a, 1], velocity[c, 1] - velocity[a, 1]
@@ -167,7 +252,7 @@ def sum_forces(first, last, occupied, elements, rows, geometry, held, velocity, 
             liquid = g1x * (velocity[b, 2] - velocity[a, 2]) + g2x * (velocity[c, 2] - velocity[a, 2])
             liquid += g1y * (velocity[b, 3] - velocity[a, 3]) + g2y * (velocity[c, 3] - velocity[a, 3])
         if smoothing:
-            r, s, t = rows[e, 0], rows[e, 1], rows[e, 2]
+            r, s, t = index(rows[e, 0]), index(rows[e, 1]), index(rows[e, 2])
             volume = third * (divergence[r, 0] + divergence[s, 0] + divergence[t, 0])
             liquid = volume
             if wet:
@@ -194,13 +279,13 @@ def sum_forces(first, last, occupied, elements, rows, geometry, held, velocity, 
 
 
 @kernel_part
-def accelerate_nodes(first, last, force, nodal, drag_time, free, acceleration):
+def accelerate_nodes(first, last, force, nodal, drag_time, step_of_node, free, acceleration):
     """Accelerations of both phases of a range of nodes; those that are not free have none.
 
     force : (n_parts, n_nodes, 4) float64
         Added up, and cleared.
-    drag_time : (n_nodes,) float64
-        Time over which the implicit drag acts [s].
+    drag_time, step_of_node : float, (n_nodes,) float64
+        Time over which the implicit drag acts on level 0 [s], and the node's step over that of level 0.
     """
     wet = acceleration.shape[1] == 4
     for i in range(first, last):
@@ -215,35 +300,15 @@ def accelerate_nodes(first, last, force, nodal, drag_time, free, acceleration):
                 acceleration[i, axis + 2] = 0.0
             if free[i, axis] and wet:
                 acceleration[i, axis], acceleration[i, axis + 2] = free_pair(
-                    total, liquid, nodal[i, 0], nodal[i, 1], nodal[i, 2], drag_time[i] * nodal[i, 3]
+                    total,
+                    liquid,
+                    nodal[i, 0],
+                    nodal[i, 1],
+                    nodal[i, 2],
+                    drag_time * step_of_node[i] * nodal[i, 3],
                 )
             elif free[i, axis]:
                 acceleration[i, axis] = total / nodal[i, 0]
-
-
-class Operator(NamedTuple):
-    """What the largest eigenvalue is sought of, and arrays for the way there, zeros at first and at the end."""
-
-    occupied: np.ndarray
-    elements: np.ndarray
-    rows: np.ndarray
-    geometry: np.ndarray
-    held: np.ndarray
-    nodal: np.ndarray
-    per_volume: np.ndarray  # (n_rows, 2) one over volume and spread volume around a row, 0 where there is none
-    free: np.ndarray  # (n_nodes, 2) bool
-    drag_time: np.ndarray
-    smoothing: bool
-    remapping: bool
-    element_cuts: np.ndarray  # (n_parts + 1,) as the others
-    row_cuts: np.ndarray
-    node_cuts: np.ndarray
-    divergence_of_part: np.ndarray  # (n_parts, n_rows, 2)
-    divergence: np.ndarray  # (n_rows, 2)
-    force: np.ndarray  # (n_parts, n_nodes, 4)
-    acceleration: np.ndarray  # (n_nodes, 4 or 2)
-    returned: np.ndarray  # (n_parts, n_nodes, 4 or 2)
-    dots: np.ndarray  # (n_parts, KRYLOV + 1)
 
 
 @kernel_part
@@ -271,8 +336,8 @@ def krylov_kernel(wet):
     def through_points(first, last, occupied, elements, held, velocity, returned):
         """Add what a range of elements passes from nodal velocities through its points and back, times mass."""
         for k in range(first, last):
-            e = occupied[k]
-            a, b, c = elements[e, 0], elements[e, 1], elements[e, 2]
+            e = index(occupied[k])
+            a, b, c = index(elements[e, 0]), index(elements[e, 1]), index(elements[e, 2])
             for x in range(width):
                 m = E_GRAINS if x < 2 else E_WATER
                 u, v, w = velocity[a, x], velocity[b, x], velocity[c, x]
@@ -281,28 +346,35 @@ def krylov_kernel(wet):
                 returned[c, x] += held[k, m + 2] * u + held[k, m + 4] * v + held[k, m + 5] * w
 
     @kernel
-    def build_krylov(thread, meeting, stage, operator, basis, hessenberg):
+    def build_krylov(thread, meeting, stage, fresh, ground, medium, operator, drag_time, basis, hessenberg):
         """Arnoldi's process: orthonormal vectors that span the powers of the operator on the first of them.
 
         The operator takes nodal velocities to accelerations, with changed sign: stresses that build in a second, mass,
         and the way through the points. Sums run over fixed parts, so the bits do not depend on the threads.
 
+        fresh : bool
+            The points are others than before.
+        drag_time : float
+            Time over which the implicit drag acts on level 0 [s].
         basis : (k + 1, n_nodes, 4 or 2) float64
             The first, a unit vector, is given.
         hessenberg : (k + 1, k) float64
             Written; zeros at first.
         """
         o = operator
-        parts = o.force.shape[0]
+        parts = o.at_nodes.shape[0]
         flat = basis.reshape(basis.shape[0], width * basis.shape[1])
+        occupied = ground.occupied
+        if fresh:
+            stage = gather(thread, meeting, stage, ground, medium, o)
         for j in range(hessenberg.shape[1]):
             velocity, image = basis[j], basis[j + 1]
             if o.smoothing:
                 part = take_part(meeting, stage, thread, parts)
                 while part >= 0:
                     sum_divergences(
-                        o.element_cuts[part], o.element_cuts[part + 1], o.occupied, o.elements, o.rows, o.geometry,
-                        o.held, velocity, o.divergence_of_part[part],
+                        o.element_cuts[part], o.element_cuts[part + 1], occupied, o.elements, o.rows, o.geometry,
+                        o.held, velocity, o.at_rows[part],
                     )  # fmt: skip
                     part = next_part(meeting, stage, thread, parts)
                 stage = next_stage(meeting, stage, parts)
@@ -312,31 +384,38 @@ def krylov_kernel(wet):
                         for phase in range(2):
                             total = 0.0
                             for p in range(parts):
-                                total += o.divergence_of_part[p, r, phase]
-                                o.divergence_of_part[p, r, phase] = 0.0
+                                total += o.at_rows[p, r, phase]
+                                o.at_rows[p, r, phase] = 0.0
                             o.divergence[r, phase] = total * o.per_volume[r, phase]
                     part = next_part(meeting, stage, thread, parts)
                 stage = next_stage(meeting, stage, parts)
             part = take_part(meeting, stage, thread, parts)
             while part >= 0:
                 sum_forces(
-                    o.element_cuts[part], o.element_cuts[part + 1], o.occupied, o.elements, o.rows, o.geometry, o.held,
-                    velocity, o.smoothing, o.divergence, o.force[part],
+                    o.element_cuts[part], o.element_cuts[part + 1], occupied, o.elements, o.rows, o.geometry, o.held,
+                    velocity, o.smoothing, o.divergence, o.at_nodes[part],
                 )  # fmt: skip
                 part = next_part(meeting, stage, thread, parts)
             stage = next_stage(meeting, stage, parts)
             part = take_part(meeting, stage, thread, parts)
             while part >= 0:
                 accelerate_nodes(
-                    o.node_cuts[part], o.node_cuts[part + 1], o.force, o.nodal, o.drag_time, o.free, o.acceleration
+                    o.node_cuts[part],
+                    o.node_cuts[part + 1],
+                    o.at_nodes,
+                    o.nodal,
+                    drag_time,
+                    o.step_of_node,
+                    o.free,
+                    o.acceleration,
                 )
                 part = next_part(meeting, stage, thread, parts)
             stage = next_stage(meeting, stage, parts)
             part = take_part(meeting, stage, thread, parts)
             while part >= 0:
                 through_points(
-                    o.element_cuts[part], o.element_cuts[part + 1], o.occupied, o.elements, o.held, o.acceleration,
-                    o.returned[part],
+                    o.element_cuts[part], o.element_cuts[part + 1], occupied, o.elements, o.held, o.acceleration,
+                    o.at_nodes[part],
                 )  # fmt: skip
                 part = next_part(meeting, stage, thread, parts)
             stage = next_stage(meeting, stage, parts)
@@ -347,8 +426,8 @@ def krylov_kernel(wet):
                     for x in range(width):
                         total = 0.0
                         for p in range(parts):
-                            total += o.returned[p, i, x]
-                            o.returned[p, i, x] = 0.0
+                            total += o.at_nodes[p, i, x]
+                            o.at_nodes[p, i, x] = 0.0
                         image[i, x] = -total / o.nodal[i, x // 2] if o.free[i, x % 2] else 0.0
                         if not o.remapping:
                             image[i, x] = -2.0 * o.acceleration[i, x] - image[i, x]
@@ -383,7 +462,7 @@ def krylov_kernel(wet):
 
 
 class Spectrum:
-    """Largest eigenvalue of a solver's state.
+    """Largest eigenvalue of a solver's state; the arrays for it are kept for the next state.
 
     Parameters
     ----------
@@ -397,52 +476,56 @@ class Spectrum:
         self.solver, self.wet = solver, solver.scene.is_two_phase
         self.shape = n_nodes, 4 if self.wet else 2
         self.remapping = solver.scene.numerics.remapping
-        self.step_of_node = 2.0 ** levels.of_row[:n_nodes]
-        held, nodal = np.empty((solver.n_occupied, ELEMENT_WIDTH)), np.zeros((parts, n_nodes, 4))
-        row_volume = np.zeros((parts, n_rows))
-        solver.over_elements(
-            sum_points, solver.occupied, solver.start, solver.order, solver.points, solver.soil_of_point, solver.soils,
-            solver._water_density, solver._water_modulus, mesh.elements, levels.rows, solver.geometry,
-            levels.stiffened, solver.scene.is_undrained, held, per_range=(nodal, row_volume),
-        )  # fmt: skip
-        nodal, row_volume = nodal.sum(axis=0), row_volume.sum(axis=0)
-        occupied, row_spread = solver.occupied[: solver.n_occupied], np.zeros((parts, n_rows))
-        row_area = np.bincount(levels.rows[occupied].ravel(), np.repeat(solver.geometry[occupied, 6], 3), n_rows)
-        fill = np.divide(row_volume, row_area, out=np.zeros(n_rows), where=row_area > 0)
-        solver.over_elements(
-            spread_elements, solver.occupied, levels.rows, solver.geometry, fill, held, per_range=(row_spread,)
-        )
-        volumes = np.column_stack([row_volume, row_spread.sum(axis=0)])
-        fixed = solver.fixed[:, None] & np.array([FIXED_X, FIXED_Y], np.int8)
         self.operator = Operator(
-            occupied=solver.occupied,
             elements=mesh.elements,
             rows=levels.rows,
             geometry=solver.geometry,
-            held=held,
-            nodal=nodal,
-            per_volume=np.divide(1.0, volumes, out=np.zeros((n_rows, 2)), where=volumes > 0),
-            free=(nodal[:, :1] > 0) & (fixed == 0),
-            drag_time=self.step_of_node,
+            stiffened=levels.stiffened,
+            fixed=solver.fixed,
+            step_of_node=2.0 ** levels.of_row[:n_nodes],
+            undrained=solver.scene.is_undrained,
             smoothing=solver.scene.numerics.volumetric_smoothing,
             remapping=self.remapping,
-            **{f"{name}_cuts": np.linspace(0, size, parts + 1).astype(np.int64)
-               for name, size in (("element", solver.n_occupied), ("row", n_rows), ("node", n_nodes))},
-            divergence_of_part=np.zeros((parts, n_rows, 2)),
+            held=np.zeros((len(mesh.elements), ELEMENT_WIDTH)),
+            nodal=np.zeros((n_nodes, 4)),
+            fill=np.zeros(n_rows),
+            per_volume=np.zeros((n_rows, 2)),
+            free=np.zeros((n_nodes, 2), bool),
+            element_cuts=np.zeros(parts + 1, np.int64),
+            row_cuts=np.linspace(0, n_rows, parts + 1).astype(np.int64),
+            node_cuts=np.linspace(0, n_nodes, parts + 1).astype(np.int64),
+            at_nodes=np.zeros((parts, n_nodes, 4)),
+            at_rows=np.zeros((parts, n_rows, 2)),
             divergence=np.zeros((n_rows, 2)),
-            force=np.zeros((parts, n_nodes, 4)),
             acceleration=np.zeros(self.shape),
-            returned=np.zeros((parts, *self.shape)),
             dots=np.zeros((parts, KRYLOV + 1)),
-        )  # fmt: skip
+        )
         self.basis = np.zeros((KRYLOV + 1, *self.shape))
+        self._fresh = True
+
+    @property
+    def arrays(self):
+        """All arrays that were made for it."""
+        shared = {"elements", "rows", "geometry", "stiffened", "fixed"}
+        own = [value for name, value in self.operator._asdict().items() if name not in shared]
+        return [self.basis, *(value for value in own if isinstance(value, np.ndarray))]
+
+    def of_state(self):
+        """The same for the state of the solver as it is now."""
+        self.operator.element_cuts[:] = np.linspace(0, self.solver.n_occupied, self.solver.parts + 1)
+        self._fresh = True
+        return self
 
     def _krylov(self, dt, start):
         """Ritz values [1/s2], their vectors in the basis, and how far each is from an eigenvalue [1/s2]."""
         self.basis[0] = start.reshape(self.shape) / _norm(start)
-        hessenberg = np.zeros((KRYLOV + 1, KRYLOV))
-        operator = self.operator._replace(drag_time=0.5 * dt * self.step_of_node)
-        self.solver.together(krylov_kernel(self.wet), operator, self.basis, hessenberg)
+        hessenberg, s = np.zeros((KRYLOV + 1, KRYLOV)), self.solver
+        ground = Ground(s.occupied, s.start, s.order, s.points, s.element_of_point, s.soil_of_point, s.soils)
+        medium = Medium(s.scene.gravity, s._water_density, s._water_modulus)
+        s.workers.together(
+            krylov_kernel(self.wet), self._fresh, ground, medium, self.operator, 0.5 * dt, self.basis, hessenberg
+        )
+        self._fresh = False
         size = next((k for k in range(1, KRYLOV) if hessenberg[k, k - 1] == 0.0), KRYLOV)
         values, vectors = np.linalg.eig(hessenberg[:size, :size])
         return values, vectors, np.abs(hessenberg[size, size - 1] * vectors[-1])
@@ -477,12 +560,13 @@ def _norm(vector):
     return float(np.sqrt(np.sum(vector**2)))
 
 
-def spectral_time_step(solver, shortest, start=None):
+def spectral_time_step(spectrum, shortest, start=None):
     """Critical time step from the largest eigenvalue.
 
     Parameters
     ----------
-    solver : mpm.solver.Solver
+    spectrum : Spectrum
+        Of the state.
     shortest : float
         A time step that is certainly not above the critical one [s]; the nearer, the sharper the drag.
     start : (k,) float64 or None
@@ -494,7 +578,7 @@ def spectral_time_step(solver, shortest, start=None):
         [s], `shortest` where the eigenvalue was not found.
     mode : (k,) float64 or None
     """
-    spectrum, dt = Spectrum(solver), shortest
+    solver, dt = spectrum.solver, shortest
     for _ in range(ROUNDS if spectrum.wet and start is None else 1):
         value, start = spectrum.largest(dt, start)
         if not 0 < value < math.inf:

@@ -172,8 +172,10 @@ def relax(solver, friction, tolerance, max_steps, progress=None):
     force = np.zeros((s.parts, len(s.mesh.nodes), 2))
     velocity = np.zeros((len(s.mesh.nodes), 2))
     layout = (s.occupied, s.start, s.order, s.points, s.soil_of_point, s.soils, s.mesh.elements, s.geometry)
+    of_elements = np.linspace(0, s.n_occupied, s.parts + 1).astype(int)
+    of_nodes = np.linspace(0, len(s.mesh.nodes), s.parts + 1).astype(int)
     # the forces of the effective stress, with no strain yet, separate what is held from what relaxes
-    s.over_elements(relax_elements, *layout, velocity, 0, per_range=(force,))
+    s.workers.over(of_elements, relax_elements, *layout, velocity, 0, per_range=(force,))
     held = mapped[:, B_FX : B_FY + 1] - force.sum(axis=0)
     held[:, 1] -= (mapped[:, B_MS] + mapped[:, B_MN]) * s.scene.gravity
     modulus = s.soils[:, S_LAMBDA] + 2 * s.soils[:, S_G]
@@ -185,15 +187,15 @@ def relax(solver, friction, tolerance, max_steps, progress=None):
     last_energy = 0.0
     residual = np.inf
     for step in range(1, max_steps + 1):
-        s.over_elements(relax_elements, *layout, velocity, 1, per_range=(force,))
+        s.workers.over(of_elements, relax_elements, *layout, velocity, 1, per_range=(force,))
         lining_energy = lining_unbalanced = 0.0
         if s.moving is not None:
             lining_energy, lining_unbalanced = s.moving.settle(
                 held + force.sum(axis=0), held_liquid, mass, velocity, s.normal, s.active, friction
             )
-        s.over_nodes(
-            relax_nodes, force, held, held_liquid, mass, s.fixed, s.contact_of_node, s.normal, s.active, friction,
-            s.wall, velocity, reaction, per_range=(sums,),
+        s.workers.over(
+            of_nodes, relax_nodes, force, held, held_liquid, mass, s.fixed, s.contact_of_node, s.normal, s.active,
+            friction, s.wall, velocity, reaction, per_range=(sums,),
         )  # fmt: skip
         energy, unbalanced, total = sums.sum(axis=0) + np.array([lining_energy, lining_unbalanced, 0.0])
         residual = float(np.sqrt(unbalanced / total)) if unbalanced > 0.0 else 0.0  # no weight at all: 0 / 0

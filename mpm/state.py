@@ -56,8 +56,8 @@ def restore_solver(solver, state):
             )
     for name in ARRAYS:
         getattr(solver, name)[:] = state[name]
-    for buffer in (solver.momenta, solver.nodal_means):  # empty between two steps
-        buffer[:] = 0.0
+    solver.means[:] = 0.0  # empty between two steps
+    solver.touched[:] = 1
     for name in NUMBERS:
         setattr(solver, name, type(getattr(solver, name))(state[name]))
     solver.mode = np.array(state["mode"], float) if len(state["mode"]) else None

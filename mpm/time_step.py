@@ -1,4 +1,4 @@
-"""The critical time step: undrained fast wave and advection over the occupied elements."""
+"""Speeds of the compression waves that limit the time step."""
 
 import numpy as np
 
@@ -30,26 +30,3 @@ def fast_wave_speed(constrained_modulus, bulk_modulus_liquid, porosity, density_
 def dry_wave_speed(constrained_modulus, porosity, density_grains):
     """Speed of the compression wave of a dry soil [m/s]; the looser, the lighter and the faster."""
     return float(np.sqrt(constrained_modulus / ((1 - porosity) * density_grains)))
-
-
-def critical_time_step(limits, wave_speed, courant):
-    """Largest stable time step, from the limits of the parts of the mesh.
-
-    Parameters
-    ----------
-    limits : list of (float, float)
-        Per part the smallest altitude / (wave speed + point speed) [s] and that point speed [m/s].
-    wave_speed : float
-        [m/s]
-    courant : float
-        Courant number [-].
-
-    Returns
-    -------
-    dt : float
-        [s]
-    limit : str
-        "acoustic" or "advective", whichever speed is the larger where dt is smallest.
-    """
-    limit, speed = min(limits)
-    return courant * limit, "advective" if speed > wave_speed else "acoustic"

@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 
-from mpm.jit import index, inline_kernel, kernel_part
+from mpm.jit import index, inline_kernel, kernel_part, prefetch
 from mpm.materials.mohr_coulomb import mohr_coulomb
 from mpm.variables import (
     B_D,
@@ -85,6 +85,7 @@ from mpm.variables import (
     Y,
 )
 
+AHEAD = 16  # points whose rows are on the way into the cache: their order is known, the machine does not guess it
 # Share of the squared altitude: the shortest wave of the mesh loses most of its amplitude in a step, none overshoots.
 PROJECTION_SMOOTHING = 0.1
 
@@ -119,7 +120,7 @@ def advance_kernel(wet, undrained, tied, remapping):
     @kernel_part
     def advance_points(
         first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, rows, geometry, nodes,
-        mean, level_of_element, dt_of_level, flip_of_level, filter_of_level, sums,
+        mean, level_of_element, dt_of_level, flip_of_level, filter_of_level, touched, sums,
     ):  # fmt: skip
         """Advance point velocities and positions from the nodes and, with remapping, map new momenta back (MUSL).
 
@@ -130,8 +131,11 @@ def advance_kernel(wet, undrained, tied, remapping):
 
         mean : (n_rows - n_nodes, 6) float64
             Of rows tied to a finer one: mean velocities over the steps of their node, of :mod:`mpm.contact`.
-        sums : (n_rows, 4) float64
-            Added with remapping: the new momenta of both phases, or of the mixture [kg m/s per metre].
+        touched : (n_rows,) uint8
+            Set for the rows of these elements.
+        sums : (n_rows, 9) float64
+            Added to its first columns, with remapping: the new momenta of both phases, or of the mixture [kg m/s per
+            metre]. `remap_nodes` reads and clears them before `element_rates` adds to the same rows.
 
         Source: Sulsky, Zhou & Schreyer (1995) for MUSL; Zhu & Bridson (2005) for the PIC/FLIP blend.
         """
@@ -143,6 +147,7 @@ def advance_kernel(wet, undrained, tied, remapping):
             g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
             x0, y0 = geometry[e, 4], geometry[e, 5]
             a, b, c = index(rows[e, 0]), index(rows[e, 1]), index(rows[e, 2])
+            touched[a] = touched[b] = touched[c] = 1
             border = tied and max(a, b, c) >= n_nodes
             jx0 = jx1 = jx2 = jy0 = jy1 = jy2 = 0.0
             if border:
@@ -157,6 +162,7 @@ def advance_kernel(wet, undrained, tied, remapping):
             pic = 1.0 - flip_fraction
             for j in range(start[e], start[e + 1]):
                 i = index(order[j])
+                prefetch(points, index(order[min(j + AHEAD, order.size - 1)]))
                 dx = points[i, X] - x0
                 dy = points[i, Y] - y0
                 n1 = g1x * dx + g1y * dy
@@ -308,12 +314,12 @@ def update_kernel(wet, undrained, plastic, smoothing, dilatant, tied):
     def update_points(
         first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, bulk_liquid, rows,
         geometry, nodes, rates, volume, fill, level_of_element, dt_of_level, ahead, advance, wave_speed,
-        element_of_point, clamps, sums, left,
+        element_of_point, clamps, touched, sums, left,
     ):  # fmt: skip
         """Advance stress, pore pressure and porosity of the points of a range of elements, and map them to the nodes.
 
         One pass does both, since passes over the points are what a step costs. `advance` False maps only.
-        Points that left their element are not mapped; `relocate` does that.
+        Points that left their element are not mapped; `locate` does that.
 
         Jaumann rate of effective stress; mass balance of the mixture for the pore pressure,
         dp/dt = -(K_w/n) [(1 - n) div v_s + n div v_l] (Jassim et al. 2013, opposite sign of p).
@@ -334,6 +340,8 @@ def update_kernel(wet, undrained, plastic, smoothing, dilatant, tied):
             How far the stress that acts on the nodes runs ahead of that of the points, in steps of the element.
         element_of_point : (n_points,) int32
             Written: -2 - element for a point that left its element.
+        touched : (n_rows,) uint8
+            Set for the rows of these elements.
         sums : (n_rows, 13) float64
             Added: masses, momenta, drag and forces of these elements.
         left : (n_points,) int32
@@ -359,6 +367,7 @@ def update_kernel(wet, undrained, plastic, smoothing, dilatant, tied):
             x0, y0 = geometry[e, 4], geometry[e, 5]
             dt = dt_of_level[level_of_element[e]]
             i0, i1, i2 = index(rows[e, 0]), index(rows[e, 1]), index(rows[e, 2])
+            touched[i0] = touched[i1] = touched[i2] = 1
             ms0 = ms1 = ms2 = ml0 = ml1 = ml2 = mn0 = mn1 = mn2 = d0 = d1 = d2 = q0 = q1 = q2 = 0.0
             sx0 = sx1 = sx2 = sy0 = sy1 = sy2 = lx0 = lx1 = lx2 = ly0 = ly1 = ly2 = 0.0
             fxx = fxy = fyy = fp = total = pressed = fastest = 0.0
@@ -391,6 +400,7 @@ def update_kernel(wet, undrained, plastic, smoothing, dilatant, tied):
             cxx = cyy = cxy = cp = 0.0
             for j in range(start[e], start[e + 1]):
                 i = index(order[j])
+                prefetch(points, index(order[min(j + AHEAD, order.size - 1)]))
                 s = index(soil_of_point[i])
                 dxx, dyy, dvol = exx, eyy, ts
                 if dilatant and soils[s, S_SIN_DIL] > 0.0:
@@ -634,11 +644,11 @@ def map_kernel(wet, undrained, tied):
     """Kernel `map_point` for points with pore water or without; with levels a point may wait outside its element."""
 
     @kernel_part
-    def map_point(row, soil, density_liquid, corner, geometry, nodes, sums):
+    def map_point(row, soil, density_liquid, corner, geometry, nodes, touched, sums):
         """Add one point to the rows of the element that holds it, as `update_points` does for those that stay.
 
         row, soil, corner, geometry : one row of points, soils, elements and geometry.
-        Returns the volume of the point [m2] and its larger squared speed [m2/s2].
+        Returns its larger squared speed [m2/s2].
         """
         dx = row[X] - geometry[4]
         dy = row[Y] - geometry[5]
@@ -662,6 +672,7 @@ def map_kernel(wet, undrained, tied):
                 weight, gx, gy = n1, geometry[0], geometry[1]
             else:
                 weight, gx, gy = n2, geometry[2], geometry[3]
+            touched[corner[k]] = 1
             b = sums[corner[k]]
             b[B_MS] += weight * m
             moving = weight * (m + n * v * density_liquid) if undrained else weight * m
@@ -680,6 +691,6 @@ def map_kernel(wet, undrained, tied):
                     b[B_PLY] += w * row[VLY]
                 b[B_FLX] += gx * v * p
                 b[B_FLY] += gy * v * p
-        return v, fastest
+        return fastest
 
     return map_point

@@ -1,8 +1,9 @@
 """The one table of what a material point carries, with its unit and sign, and of what a node carries.
 
 A point is one row of 16 float64 (two cache lines), so that a point reached through an index
-costs two memory accesses whatever is read of it. Effective stress is tension positive, pore
-pressure compression positive; total stress = effective stress - pore pressure * identity.
+costs two memory accesses whatever is read of it; what `advance_points` writes is in the first.
+Effective stress is tension positive, pore pressure compression positive; total stress =
+effective stress - pore pressure * identity.
 """
 
 POINT_VARIABLES = (
@@ -13,18 +14,18 @@ POINT_VARIABLES = (
     ("velocity_solid_y", "m s-1", "velocity of the grains"),
     ("velocity_liquid_x", "m s-1", "velocity of the pore water"),
     ("velocity_liquid_y", "m s-1", "velocity of the pore water"),
+    ("pore_pressure", "Pa", "compression positive; negative: missing volume of water, carries nothing"),
+    ("porosity", "1", "volume of voids over total volume"),
     ("stress_xx", "Pa", "effective stress, tension positive"),
     ("stress_yy", "Pa", "effective stress, tension positive"),
     ("stress_zz", "Pa", "effective stress out of plane, tension positive"),
     ("stress_xy", "Pa", "effective shear stress"),
-    ("pore_pressure", "Pa", "compression positive; negative: missing volume of water, carries nothing"),
-    ("porosity", "1", "volume of voids over total volume"),
     ("grain_mass", "kg m-1", "mass of grains per metre of tunnel, constant"),
+    ("deviatoric_strain", "1", "accumulated equivalent deviatoric strain, sqrt(2/3 e:e)"),
     ("x_initial", "m", "horizontal position at the start"),
     ("y_initial", "m", "vertical position at the start"),
-    ("deviatoric_strain", "1", "accumulated equivalent deviatoric strain, sqrt(2/3 e:e)"),
 )
-(X, Y, VSX, VSY, VLX, VLY, SXX, SYY, SZZ, SXY, P, N, MASS, X0, Y0, EQ) = range(len(POINT_VARIABLES))
+(X, Y, VSX, VSY, VLX, VLY, P, N, SXX, SYY, SZZ, SXY, MASS, EQ, X0, Y0) = range(len(POINT_VARIABLES))
 POINT_WIDTH = len(POINT_VARIABLES)
 
 # Element-to-node buffer: what an element adds to one of its nodes.
@@ -36,7 +37,7 @@ BUFFER_WIDTH = 13
 (V_MS, V_ML, V_SX, V_SY, V_LX, V_LY, V_DSX, V_DSY, V_DLX, V_DLY, V_P, V_TS, V_WS, V_WL, V_GX, V_GY) = range(16)
 NODE_WIDTH = 16
 NODAL_MEANS = 9  # what `element_rates` sums at a node
-NODAL_MOMENTA = 4  # what `advance_points` sums at a node
+NODAL_MOMENTA = 4  # what `advance_points` sums at a node before, in the first of the same columns
 
 # Element rates: strain rates, spin, divergence of both phases.
 (R_XX, R_YY, R_XY, R_W, R_DS, R_DL) = range(6)

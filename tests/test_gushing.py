@@ -1,6 +1,7 @@
 """The gate opens: what must hold whatever the numbers are."""
 
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -50,19 +51,26 @@ def test_flow_zone_grows(event):
     assert area[0] == 0.0 and all(b >= a - 1e-9 for a, b in itertools.pairwise(area)) and area[-1] > 0.3
 
 
-def test_result_has_the_same_bits_for_any_number_of_threads():
+def test_result_has_the_same_bits_for_any_number_of_threads_and_of_steps_at_once():
     scene = coupling.load_scene("quick").mpm
     mesh = mpm.build_mesh(scene)
-    states = []
-    for threads in (1, 2):
+    solvers, batches = [], []
+    for threads, most_substeps in ((1, 1), (2, math.inf), (4, 50)):
         solver = mpm.Solver(scene, mesh, threads=threads)
         solver.relax()
         solver.open_gate()
-        for _ in range(150):
-            solver.step()
-        states.append(solver.points)
-    assert len(mesh.elements) > mpm.solver.SMALLEST_PARALLEL  # else the second run was serial too
-    assert np.array_equal(*states)
+        batches.append(0)
+        while solver.time < 0.2:
+            limits = solver.advance(0.2, most_substeps)
+            assert limits and set(limits) <= {"acoustic", "advective", "output"}
+            batches[-1] += 1
+        solvers.append(solver)
+    assert len(mesh.elements) > mpm.solver.SMALLEST_PARALLEL  # else the other runs were serial too
+    assert batches[0] == solvers[0].long_step_count > batches[2] > batches[1]
+    for other in solvers[1:]:
+        assert other.long_step_count == solvers[0].long_step_count and other.time == solvers[0].time
+        for name in ("points", "nodes", "sums", "impulse", "ledger", "clamps"):
+            assert np.array_equal(getattr(other, name), getattr(solvers[0], name)), name
 
 
 def test_gate_on_the_left_mirrors_the_gate_on_the_right():

@@ -204,9 +204,9 @@ def test_wall_pushes_an_undrained_mixture_as_two_tied_phases():
             given[0, :, [B_PSX, B_PSY]] = speed * (sums[0, :, B_MS] + sums[0, :, B_MN])
         nodes, impulse, ledger = np.zeros((n, NODE_WIDTH)), np.zeros((n, 5)), np.zeros(len(LEDGER))
         numba.njit(error_model="numpy")(solve.py_func)(  # a kernel's part has no code of its own to call
-            0, n, row, np.full(n, -1, np.int32), np.zeros(n, np.int8), 0, np.array([1e-3]), given, np.zeros((0, 6)),
-            9.81, 1000.0, np.zeros(n, np.int8), row, normal, np.ones(n, np.int8), np.full(n, 0.2), None, nodes,
-            np.zeros(n, np.int8), impulse, ledger,
+            0, n, row, np.full(n, -1, np.int32), np.zeros(n, np.int8), 0, np.array([1e-3]),
+            np.ones((1, n), np.uint8), given, np.zeros((0, 6)), 9.81, 1000.0, np.zeros(n, np.int8), row,
+            normal, np.ones(n, np.int8), np.full(n, 0.2), None, nodes, np.zeros(n, np.int8), impulse, ledger,
         )  # fmt: skip
         assert ledger[6] < 1e-12 * ledger[7]  # reactions explain the change of momentum
         found.append((nodes[:, [V_SX, V_SY]], impulse / 1e-3))

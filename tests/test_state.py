@@ -14,14 +14,14 @@ from mpm.state import ARRAYS, NUMBERS
 BUILT = {
     "scene", "mesh", "soils", "parts", "geometry", "neighbours", "fixed", "contact_of_node", "n_contact", "normal",
     "active", "friction", "lining", "threads", "initial_grain_mass", "initial", "_normal_open", "_active_open",
-    "_closed", "_pool", "_long_step", "_water_density", "_water_modulus", "start", "order", "occupied", "n_occupied",
-    "n_active", "_cuts", "levels", "copies", "mirror_line", "_mirrored", "_meeting", "_used",
-    "moving", "wall", "ahead", "_periods",
+    "_closed", "workers", "_long_step", "_water_density", "_water_modulus", "start", "order", "occupied", "n_occupied",
+    "n_active", "_cuts", "levels", "copies", "mirror_line", "_mirrored", "_used",
+    "moving", "wall", "clock", "touched", "_spectrum", "_altitude",
 }  # fmt: skip
 #: Written by each step before it is read.
 SCRATCH = {
-    "tied_means", "momenta", "nodal_means", "status", "rates", "_spare", "_moved", "_left", "_counts", "_measures",
-    "_found",
+    "tied_means", "means", "status", "rates", "_spare", "_left", "_counts", "_measures",
+    "_suspended", "_bad", "_n_left", "_first_left",
 }  # fmt: skip
 STATE = {*ARRAYS, *NUMBERS, "gate_open", "_mapped", "_limits", "mode"}
 
@@ -87,7 +87,7 @@ def test_continued_simulation_gives_the_bits_of_the_whole(scene, mesh, whole, wh
     simulation = mpm.Simulation(scene, mesh, threads)
     if simulation.solver.moving is not None:
         simulation.solver.wall[:] = np.nan
-    for name in SCRATCH - {"_spare", "_moved", "_left"}:
+    for name in SCRATCH - {"_spare", "_left"}:
         array = getattr(simulation.solver, name)
         array[...] = np.nan if array.dtype.kind == "f" else 99
     simulation.restore(state)

@@ -16,7 +16,7 @@ import numpy as np
 from coupling.verification.boxes import box_mesh
 from mpm.scene import Scene
 from mpm.solver import Solver
-from mpm.spectrum import spectral_time_step
+from mpm.spectrum import Spectrum, spectral_time_step
 from mpm.variables import SXX, SXY, SYY, V_P, VLX, VLY, VSX, VSY, P, X, Y
 
 # Excess of the spectral radius over 1 that ends stability. At the limit a pair of eigenvalues splits at -1, and one per
@@ -158,7 +158,7 @@ class Amplification:
         solver.nodes[:, V_P] = solver.points[:, P].max()
         solver.limit_speed = solver.wave_speed
         self.altitude = solver.time_step_estimate()[0]
-        self.spectral, _ = spectral_time_step(solver, 0.5 * self.altitude)
+        self.spectral, _ = spectral_time_step(Spectrum(solver).of_state(), 0.5 * self.altitude)
         self._start = _copied(solver)
         self._spaces = self._bases(speed, stress)
         self.leak = 0.0

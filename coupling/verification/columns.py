@@ -16,7 +16,7 @@ from coupling.verification.two_phase import (
 )
 from mpm.scene import Scene
 from mpm.solver import Solver
-from mpm.variables import MASS, SXX, SYY, SZZ, VLX, VLY, VSX, VSY, P, Y
+from mpm.variables import MASS, SXX, SYY, SZZ, VLX, VLY, VSX, VSY, X0, Y0, P, Y
 
 
 def column(
@@ -168,7 +168,7 @@ def hydrostatics(
     }
     misses = {name: float(np.abs(lining[name] / value - 1).max()) for name, value in exact.items()}
     inside = solver.element_of_point >= 0
-    order = np.lexsort(solver.points[:, 13:15].T), np.lexsort(before[:, 13:15].T)
+    order = np.lexsort(solver.points[:, X0 : Y0 + 1].T), np.lexsort(before[:, X0 : Y0 + 1].T)
     change = np.abs(solver.points[order[0]][:, [SXX, SYY, SZZ, P]] - before[order[1]][:, [SXX, SYY, SZZ, P]]).max()
     speed = np.abs(solver.points[inside][:, [VSX, VSY, VLX, VLY]]).max()
     return Result(

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mpm.contact import FIXED_X, FIXED_Y
-from mpm.long_step import ADVANCE, FOLLOW, RATES, REMAP, SOLVE
+from mpm.long_step import ADVANCE, FOLLOW, PLAN, RATES, REMAP, SOLVE
 from mpm.scene import Scene
 from mpm.solver import Solver
 from mpm.variables import V_DLX, V_DLY, V_DSX, V_DSY, V_LX, V_LY, V_MS, V_SX, V_SY
@@ -39,14 +39,14 @@ class DrivenSolver(Solver):
         self.driven_liquid, self.velocity_liquid = np.zeros(shape, bool), np.zeros(shape)
         self.force, self.reaction = np.zeros(shape), np.zeros(shape)
 
-    def _advance(self, clock):
-        self._run(clock, SOLVE, SOLVE)
-        self._drive(float(clock.dt_of_level[0]))
-        self._run(clock, ADVANCE, REMAP)
+    def _advance(self, batch):
+        self._run(PLAN, SOLVE, batch)
+        self._drive(float(self.clock.dt_of_level[0]))
+        self._run(ADVANCE, REMAP)
         moved = self.driven & (self.nodes[:, V_MS] > 0)[:, None]
         self.nodes[:, V_SX : V_SY + 1][moved] = self.velocity[moved]
         self.nodes[:, V_LX : V_LY + 1][self.driven_liquid] = self.velocity_liquid[self.driven_liquid]
-        self._run(clock, RATES, FOLLOW)
+        self._run(RATES, FOLLOW)
 
     def _drive(self, dt):
         row = self.nodes

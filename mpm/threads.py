@@ -1,0 +1,62 @@
+"""The threads of a solver: idle between uses, and never more of them at work than asked for."""
+
+from concurrent.futures import ThreadPoolExecutor, wait
+
+import numpy as np
+
+from mpm.meeting import meeting_width, stage_at_hand
+
+
+class Threads:
+    """Threads that run compiled code without the interpreter's lock.
+
+    Parameters
+    ----------
+    count : int
+        With the thread that calls.
+    most_parts : int
+        Of a stage of the kernels that they share.
+    """
+
+    def __init__(self, count, most_parts):
+        self.count = count
+        self._pool = ThreadPoolExecutor(count - 1) if count > 1 else None
+        self._meeting = np.zeros(meeting_width(most_parts), np.int64)
+
+    def together(self, kernel, *arguments):
+        """Run a kernel of many stages by all threads: kernel(thread, meeting, first stage, *arguments).
+
+        One that is late finds all done by the others (`mpm.meeting`), so nobody waits for its end.
+
+        Returns
+        -------
+        list of concurrent.futures.Future
+            The other threads.
+        """
+        stage, others = stage_at_hand(self._meeting), []
+        try:
+            for thread in range(1, self.count):
+                others.append(self._pool.submit(kernel, thread, self._meeting, stage, *arguments))
+            kernel(0, self._meeting, stage, *arguments)
+        except BaseException:  # an interrupt: the others would go on behind the caller's back
+            wait(others)
+            raise
+        return [other for other in others if not other.cancel()]
+
+    def over(self, cuts, kernel, *arguments, per_range=()):
+        """Run a kernel once for each range between two `cuts`: kernel(first, last, *arguments, *own).
+
+        Each range gets its own of the `per_range` arrays.
+        """
+        ranges = range(len(cuts) - 1)
+
+        def call(r):
+            kernel(cuts[r], cuts[r + 1], *arguments, *(a[r] for a in per_range))
+
+        if self._pool is None:
+            for r in ranges:
+                call(r)
+        else:
+            others = self._pool.map(call, ranges[1:])
+            call(0)
+            list(others)  # waits, and raises what they raised
