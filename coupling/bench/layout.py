@@ -24,9 +24,9 @@ def bytes_per_point_step(solver):
     of_points = PASSES * (2 * row + solver.order.itemsize + solver.soil_of_point.itemsize)
     record = solver.geometry[0].nbytes + mesh.elements[0].nbytes + solver.occupied.itemsize + solver.start.itemsize
     of_elements = ELEMENT_PASSES * record + 2 * solver.rates[0].nbytes + 2 * solver.volume[0].nbytes
-    # written and read by the passes that sum at the nodes, then read by those that interpolate
-    sums = sum(a.nbytes for a in (solver.sums, solver.momenta, solver.nodal_means))
-    of_nodes = 3 * sums + (ELEMENT_PASSES + 2) * solver.nodes.nbytes
+    # written, read and cleared where a part of the mesh adds to a row; then read by the passes that interpolate
+    row_of_sums = solver.sums[0, 0].nbytes + solver.means[0, 0].nbytes
+    of_nodes = 3 * row_of_sums * np.count_nonzero(solver.touched) + (ELEMENT_PASSES + 2) * solver.nodes.nbytes
     return {
         "points": float(of_points),
         "elements": of_elements * np.count_nonzero(np.diff(solver.start)) / points,
@@ -37,7 +37,8 @@ def bytes_per_point_step(solver):
 def operations_per_point_step(solver):
     """Floating-point operations in the loops over points of a step's kernels: dict of kernel name to count."""
     counts = {}
-    kernels = inspect.getclosurevars(solver._long_step.py_func).nonlocals
+    substep = inspect.getclosurevars(solver._long_step.py_func).nonlocals["substep"]
+    kernels = inspect.getclosurevars(substep.py_func).nonlocals
     for kernel in (kernels["advance_points"], kernels["update_points"]):
         tree = ast.parse(textwrap.dedent(inspect.getsource(kernel.py_func)))
         function = next(node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef))

@@ -46,7 +46,7 @@ sys.stdin.readline()
 done, end = solver.point_steps, time.perf_counter() + float(sys.argv[1])
 begin, used = time.perf_counter(), time.process_time()
 while time.perf_counter() < end:
-    solver.step()
+    solver.advance(float("inf"), 50)
 print((solver.point_steps - done) / (time.perf_counter() - begin), (time.process_time() - used) / (end - begin))
 """
 
