@@ -38,9 +38,14 @@ def kernel_part(function):
     return _compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
+def integer_kernel(function):
+    """A kernel of whole numbers only: they are the same however it is compiled, so callers need no copy of it."""
+    return kernel(function, forceinline=False)
+
+
 def _compiled(function, **options):
     function.__qualname__ = variant_name(function)
-    return numba.njit(**OPTIONS, **options)(function)
+    return numba.njit(**{**OPTIONS, **options})(function)
 
 
 def inline_kernel(function):

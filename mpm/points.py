@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from mpm.jit import LINE, index, kernel, kernel_part
+from mpm.jit import LINE, index, integer_kernel, kernel, kernel_part
 from mpm.transfer import map_kernel
 from mpm.variables import C_RETURNED, MASS, POINT_WIDTH, S_RHO_S, SXX, SYY, SZZ, X0, Y0, N, P, X, Y
 
@@ -149,7 +149,7 @@ def initial_stress(scene, depth):
     return total - pressure, pressure
 
 
-@kernel
+@integer_kernel
 def sort_by_element(element_of_point, n_elements, start, order, occupied):
     """Counting sort: points of element e become order[start[e]:start[e + 1]], in ascending point number.
 
@@ -200,7 +200,20 @@ def mass_inside(points, element_of_point, x, y, radius):
     return total
 
 
-@kernel
+@kernel_part
+def place_of(element, occupied, n_occupied):
+    """Place of the first of the occupied elements that is not below one (numpy's takes two seconds to compile)."""
+    low, high = 0, n_occupied
+    while low < high:
+        middle = (low + high) // 2
+        if occupied[middle] < element:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@integer_kernel
 def cut_by_work(start, occupied, n_occupied, element_cuts, n_levels, cuts):
     """Cut the occupied elements of the finest levels into parts of about as much work.
 
@@ -220,7 +233,7 @@ def cut_by_work(start, occupied, n_occupied, element_cuts, n_levels, cuts):
     for level in range(n_levels):
         begin, after = start[element_cuts[level]], start[element_cuts[level + 1]]
         first = end
-        end = np.searchsorted(occupied[:n_occupied], element_cuts[level + 1])
+        end = place_of(element_cuts[level + 1], occupied, n_occupied)
         work = after - begin + ELEMENT_WORK * (end - first)
         cuts[level, 0] = low = first
         for part in range(1, parts):
@@ -262,7 +275,7 @@ def shift_range(array, spare, first, last, shift):
         array[index(j + shift)] = spare[index(j)]
 
 
-@kernel
+@integer_kernel
 def update_order(
     element_of_point, moved_point, moved_from, n_moved, start, order, occupied, n_occupied, spare_start, spare_order
 ):
@@ -277,32 +290,34 @@ def update_order(
     Returns the number of occupied elements and of points.
     """
     n_elements = start.size - 1
-    touched, n_touched = np.empty(2 * n_moved, np.int32), 0
+    listed, touched, n_listed = np.empty(2 * n_moved, np.int32), np.empty(2 * n_moved, np.int32), 0
     for k in range(n_moved):
-        touched[n_touched] = moved_from[k]
-        n_touched += 1
+        listed[n_listed] = moved_from[k]
+        n_listed += 1
         if element_of_point[moved_point[k]] >= 0:
-            touched[n_touched] = element_of_point[moved_point[k]]
-            n_touched += 1
-    touched = touched[:n_touched]
-    touched.sort()
-    n_touched, n_held = 0, 0
-    for e in touched:
+            listed[n_listed] = element_of_point[moved_point[k]]
+            n_listed += 1
+    ascending, n_touched, n_held = np.argsort(listed[:n_listed], kind="mergesort"), 0, 0
+    for k in range(n_listed):
+        e = listed[ascending[k]]
         if n_touched == 0 or e != touched[n_touched - 1]:
             touched[n_touched] = e
             n_touched += 1
             n_held += start[e + 1] - start[e]
     # the new lists of these elements, one after the other
     held, n_new = np.empty(n_held + n_moved, np.int32), 0
-    arriving, a = np.argsort(element_of_point[moved_point[:n_moved]], kind="mergesort"), 0
+    goal = np.empty(n_moved, np.int32)
+    for k in range(n_moved):
+        goal[k] = element_of_point[moved_point[k]]
+    arriving, a = np.argsort(goal, kind="mergesort"), 0
     ends = np.empty(n_touched, np.int64)
     for t in range(n_touched):
         e = touched[t]
-        while a < n_moved and element_of_point[moved_point[arriving[a]]] < e:
+        while a < n_moved and goal[arriving[a]] < e:
             a += 1
         read = start[e]
         while True:
-            incoming = a < n_moved and element_of_point[moved_point[arriving[a]]] == e
+            incoming = a < n_moved and goal[arriving[a]] == e
             if read < start[e + 1] and (not incoming or order[read] < moved_point[arriving[a]]):
                 i = order[read]
                 read += 1
@@ -330,7 +345,7 @@ def update_order(
         ranges[t, 0], ranges[t, 2] = start[e + 1], shift
         ranges[t, 1] = start[touched[t + 1]] if t + 1 < n_touched else start[n_elements]
         if (count > 0) != (before > 0):
-            place = np.searchsorted(occupied[:n_occupied], e)
+            place = place_of(e, occupied, n_occupied)
             if n_places > 0:
                 places[n_places - 1, 1] = place
             change += 1 if count > 0 else -1
@@ -376,9 +391,7 @@ def follow_points(
     removed : float
         Grains taken out [kg/m].
     """
-    found = n_left.sum()
-    moved_point, moved_from = np.empty(found, np.int32), np.empty(found, np.int32)
-    n_moved, removed = 0, 0.0
+    moved, n_moved, removed = np.empty(n_left.sum(), np.int32), 0, 0.0
     for part in range(n_left.size):
         for k in range(first_left[part], first_left[part] + n_left[part]):
             i = left[k]
@@ -391,15 +404,19 @@ def follow_points(
             else:
                 removed += points[i, MASS]
             if e != origin[k]:
-                moved_point[n_moved], moved_from[n_moved] = i, origin[k]
+                moved[n_moved] = k
                 n_moved += 1
     if n_moved == 0:
         return n_occupied, start[start.size - 1], removed
-    ascending = np.argsort(moved_point[:n_moved])
+    moved_point, moved_from = np.empty(n_moved, np.int32), np.empty(n_moved, np.int32)
+    for k in range(n_moved):
+        moved_point[k] = left[moved[k]]
+    ascending = np.argsort(moved_point, kind="mergesort")
+    for k in range(n_moved):
+        moved_point[k], moved_from[k] = left[moved[ascending[k]]], origin[moved[ascending[k]]]
     n_occupied, n_active = update_order(
-        element_of_point, moved_point[ascending], moved_from[ascending], n_moved, start, order, occupied, n_occupied,
-        spare_start, spare_order,
-    )  # fmt: skip
+        element_of_point, moved_point, moved_from, n_moved, start, order, occupied, n_occupied, spare_start, spare_order
+    )
     return n_occupied, n_active, removed
 
 
