@@ -54,7 +54,6 @@ class Net(NamedTuple):
     element_cuts: np.ndarray  # of the levels
     volume: np.ndarray
     fill: np.ndarray
-    rates: np.ndarray
     which_node: np.ndarray
     next_row: np.ndarray
     level_of_row: np.ndarray
@@ -258,7 +257,7 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
                 for level in range(finished + 1):
                     element_rates(
                         cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, net.rows,
-                        net.geometry, net.nodes, net.volume, net.fill, net.rates, net.means[part],
+                        net.geometry, net.nodes, net.volume, net.fill, net.means[part],
                     )  # fmt: skip
                 part = next_part(meeting, stage, thread, parts)
             stage = next_stage(meeting, stage, parts)
@@ -288,7 +287,7 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
                     more, wrong, loose, local, speed = update_points(
                         cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, ground.start,
                         ground.order, ground.points, ground.soil_of_point, ground.soils, medium.density_liquid,
-                        medium.bulk_liquid, net.rows, net.geometry, net.nodes, net.rates, net.volume,
+                        medium.bulk_liquid, net.rows, net.geometry, net.nodes, net.volume,
                         net.fill, net.level_of_element, clock.dt_of_level, clock.ahead, advance, pace.wave_speed,
                         ground.element_of_point, tally.clamps[part], net.touched[part], net.sums[part],
                         tally.left[base + left :],

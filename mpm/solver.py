@@ -61,7 +61,6 @@ from mpm.variables import (
     MASS,
     NODAL_MEANS,
     NODE_WIDTH,
-    RATE_WIDTH,
     S_G,
     S_LAMBDA,
     V_P,
@@ -140,7 +139,6 @@ class Solver(Measures):
         self.nodes = np.zeros((n_rows, NODE_WIDTH))
         self.tied_means = np.zeros((n_rows - n, 6))
         self.status = np.zeros(n, np.int8)
-        self.rates = np.zeros((m, RATE_WIDTH))
         self.volume = np.zeros((m, 2))
         self.fill = np.zeros(n_rows)
         self.clock = Clock.of(self.levels)
@@ -423,7 +421,7 @@ class Solver(Measures):
             ),
             Net(
                 levels.rows, self.geometry, self.neighbours, levels.of_element, levels.element_cuts,
-                self.volume, self.fill, self.rates, levels.nodes, levels.next_row, levels.of_row, levels.row_order,
+                self.volume, self.fill, levels.nodes, levels.next_row, levels.of_row, levels.row_order,
                 self._mirrored, self.nodes, self.tied_means, self.status, self.touched, self.sums, self.means,
             ),
             Walls(

@@ -38,12 +38,6 @@ from mpm.variables import (
     MODEL_ELASTIC,
     POROSITY_CEILING,
     POROSITY_FLOOR,
-    R_DL,
-    R_DS,
-    R_W,
-    R_XX,
-    R_XY,
-    R_YY,
     S_APEX,
     S_C_COS,
     S_DRAG,
@@ -107,6 +101,13 @@ def spread_volume(volume, area, fill0, fill1, fill2):
     """
     inside = min(fill0, fill1, fill2, 1.0)
     return (1.0 - inside) * volume + inside * area * (fill0 + fill1 + fill2) / 3.0
+
+
+@inline_kernel
+def gradients(g1x, g1y, g2x, g2y, v0x, v0y, v1x, v1y, v2x, v2y):
+    """Velocity gradients (xx, yy, xy, yx) of an element from those of its corners [1/s]."""
+    ux1, ux2, uy1, uy2 = v1x - v0x, v2x - v0x, v1y - v0y, v2y - v0y
+    return g1x * ux1 + g2x * ux2, g1y * uy1 + g2y * uy2, g1y * ux1 + g2y * ux2, g1x * uy1 + g2x * uy2
 
 
 @cache
@@ -246,8 +247,8 @@ def rates_kernel(wet, undrained):
     """Kernel `element_rates` for points with pore water or without, `undrained` where it moves with the grains."""
 
     @kernel_part
-    def element_rates(first, last, occupied, rows, geometry, nodes, volume, fill, rates, sums):
-        """Strain rates, spin and divergences of the remapped velocities, constant in an element [1/s].
+    def element_rates(first, last, occupied, rows, geometry, nodes, volume, fill, sums):
+        """Sum the divergences of the remapped velocities, constant in an element, at its nodes [1/s].
 
         volume : (n_elements, 2) float64, of `update_points`.
         fill : (n_rows,) float64
@@ -261,26 +262,25 @@ def rates_kernel(wet, undrained):
             e = index(occupied[k])
             g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
             a, b, c = index(rows[e, 0]), index(rows[e, 1]), index(rows[e, 2])
-            ux1, ux2 = nodes[b, V_SX] - nodes[a, V_SX], nodes[c, V_SX] - nodes[a, V_SX]
-            uy1, uy2 = nodes[b, V_SY] - nodes[a, V_SY], nodes[c, V_SY] - nodes[a, V_SY]
-            xx = g1x * ux1 + g2x * ux2
-            yy = g1y * uy1 + g2y * uy2
-            xy = g1y * ux1 + g2y * ux2
-            yx = g1x * uy1 + g2x * uy2
-            rates[e, R_XX], rates[e, R_YY], rates[e, R_XY], rates[e, R_W] = xx, yy, 0.5 * (xy + yx), 0.5 * (yx - xy)
-            rates[e, R_DS] = xx + yy
+            xx, yy, _, _ = gradients(
+                g1x, g1y, g2x, g2y, nodes[a, V_SX], nodes[a, V_SY], nodes[b, V_SX], nodes[b, V_SY], nodes[c, V_SX],
+                nodes[c, V_SY],
+            )  # fmt: skip
+            divergence = xx + yy
             v = volume[e, 0]
             area = geometry[e, 6] if v > 0.0 else 0.0
             for d in (a, b, c):
                 sums[d, 0] += v
-                sums[d, 1] += v * rates[e, R_DS]
+                sums[d, 1] += v * divergence
                 sums[d, 8] += area
             if wet:
+                relative = 0.0
                 if not undrained:
-                    rates[e, R_DL] = (
-                        g1x * (nodes[b, V_LX] - nodes[a, V_LX]) + g2x * (nodes[c, V_LX] - nodes[a, V_LX])
-                        + g1y * (nodes[b, V_LY] - nodes[a, V_LY]) + g2y * (nodes[c, V_LY] - nodes[a, V_LY])
+                    xx, yy, _, _ = gradients(
+                        g1x, g1y, g2x, g2y, nodes[a, V_LX], nodes[a, V_LY], nodes[b, V_LX], nodes[b, V_LY],
+                        nodes[c, V_LX], nodes[c, V_LY],
                     )  # fmt: skip
+                    relative = xx + yy - divergence
                 pressed = volume[e, 1]
                 spread = pressed
                 if v > 0.0:
@@ -289,9 +289,9 @@ def rates_kernel(wet, undrained):
                 px, py = pressed * (g1x * p1 + g2x * p2), pressed * (g1y * p1 + g2y * p2)
                 for d in (a, b, c):
                     sums[d, 2] += pressed
-                    sums[d, 3] += pressed * rates[e, R_DS]
+                    sums[d, 3] += pressed * divergence
                     if not undrained:
-                        sums[d, 4] += spread * (rates[e, R_DL] - rates[e, R_DS])
+                        sums[d, 4] += spread * relative
                     sums[d, 5] += px
                     sums[d, 6] += py
                     sums[d, 7] += spread
@@ -313,7 +313,7 @@ def update_kernel(wet, undrained, plastic, smoothing, dilatant, tied):
     @kernel_part
     def update_points(
         first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, bulk_liquid, rows,
-        geometry, nodes, rates, volume, fill, level_of_element, dt_of_level, ahead, advance, wave_speed,
+        geometry, nodes, volume, fill, level_of_element, dt_of_level, ahead, advance, wave_speed,
         element_of_point, clamps, touched, sums, left,
     ):  # fmt: skip
         """Advance stress, pore pressure and porosity of the points of a range of elements, and map them to the nodes.
@@ -329,8 +329,8 @@ def update_kernel(wet, undrained, plastic, smoothing, dilatant, tied):
 
         Parameters
         ----------
-        rates : (n_elements, 6) float64
-            Strain rates [1/s].
+        nodes : (n_rows, 16) float64
+            Their velocities are those of `element_rates`: strain rates are computed again, memory is dearer.
         volume : (n_elements, 2) float64
             Material volume, and that of points under pore pressure [m2]; read of the last and written for the
             next step.
@@ -372,8 +372,12 @@ def update_kernel(wet, undrained, plastic, smoothing, dilatant, tied):
             sx0 = sx1 = sx2 = sy0 = sy1 = sy2 = lx0 = lx1 = lx2 = ly0 = ly1 = ly2 = 0.0
             fxx = fxy = fyy = fp = total = pressed = fastest = 0.0
             p0 = p1 = p2 = px = py = 0.0
-            own_s = dt * rates[e, R_DS]
-            ts = rates[e, R_DS]
+            rate_xx, rate_yy, xy, yx = gradients(
+                g1x, g1y, g2x, g2y, nodes[i0, V_SX], nodes[i0, V_SY], nodes[i1, V_SX], nodes[i1, V_SY],
+                nodes[i2, V_SX], nodes[i2, V_SY],
+            )  # fmt: skip
+            ts = rate_xx + rate_yy
+            own_s = dt * ts
             if smoothing:
                 ts = third * (nodes[i0, V_TS] + nodes[i1, V_TS] + nodes[i2, V_TS])
             if wet:
@@ -381,17 +385,23 @@ def update_kernel(wet, undrained, plastic, smoothing, dilatant, tied):
                 # gradient of the projected pressure, less its nodal mean: zero for a linear pressure
                 px = g1x * (p1 - p0) + g2x * (p2 - p0) - third * (nodes[i0, V_GX] + nodes[i1, V_GX] + nodes[i2, V_GX])
                 py = g1y * (p1 - p0) + g2y * (p2 - p0) - third * (nodes[i0, V_GY] + nodes[i1, V_GY] + nodes[i2, V_GY])
-                own_l = dt * rates[e, R_DL] if two_phase else own_s
+                own_l = own_s
+                if two_phase:
+                    liquid_xx, liquid_yy, _, _ = gradients(
+                        g1x, g1y, g2x, g2y, nodes[i0, V_LX], nodes[i0, V_LY], nodes[i1, V_LX], nodes[i1, V_LY],
+                        nodes[i2, V_LX], nodes[i2, V_LY],
+                    )  # fmt: skip
+                    own_l = dt * (liquid_xx + liquid_yy)
                 wet_s, wet_l = own_s, own_l
                 if smoothing and volume[e, 1] > 0.0:
                     wet_s = wet_l = dt * third * (nodes[i0, V_WS] + nodes[i1, V_WS] + nodes[i2, V_WS])
                 if smoothing and two_phase and volume[e, 1] > 0.0:
                     wet_l = dt * third * (nodes[i0, V_WL] + nodes[i1, V_WL] + nodes[i2, V_WL])
-            correction = 0.5 * (ts - rates[e, R_DS])
-            exx = dt * (rates[e, R_XX] + correction)
-            eyy = dt * (rates[e, R_YY] + correction)
-            exy = dt * rates[e, R_XY]
-            spin = dt * rates[e, R_W]
+            correction = 0.5 * (ts - (rate_xx + rate_yy))
+            exx = dt * (rate_xx + correction)
+            eyy = dt * (rate_yy + correction)
+            exy = 0.5 * dt * (xy + yx)
+            spin = 0.5 * dt * (yx - xy)
             ts *= dt
             mean = ts * third
             equivalent = np.sqrt(2.0 * third * ((exx - mean) ** 2 + (eyy - mean) ** 2 + mean * mean + 2.0 * exy * exy))
@@ -404,7 +414,7 @@ def update_kernel(wet, undrained, plastic, smoothing, dilatant, tied):
                 s = index(soil_of_point[i])
                 dxx, dyy, dvol = exx, eyy, ts
                 if dilatant and soils[s, S_SIN_DIL] > 0.0:
-                    dxx, dyy, dvol = dt * rates[e, R_XX], dt * rates[e, R_YY], own_s
+                    dxx, dyy, dvol = dt * rate_xx, dt * rate_yy, own_s
                 if border:
                     before = max(points[i, P], 0.0) if wet else 0.0
                     cxx, cyy, cxy, cp = points[i, SXX] - before, points[i, SYY] - before, points[i, SXY], before

@@ -39,10 +39,6 @@ NODE_WIDTH = 16
 NODAL_MEANS = 9  # what `element_rates` sums at a node
 NODAL_MOMENTA = 4  # what `advance_points` sums at a node before, in the first of the same columns
 
-# Element rates: strain rates, spin, divergence of both phases.
-(R_XX, R_YY, R_XY, R_W, R_DS, R_DL) = range(6)
-RATE_WIDTH = 6
-
 # Soil parameters, one row a soil.
 (
     S_MODEL, S_LAMBDA, S_G, S_K, S_C_COS, S_SIN, S_SIN_DIL, S_APEX, S_TENSION, S_LOOSE, S_N0, S_DRAG, S_RHO_S,
