@@ -39,9 +39,11 @@ class Levels:
     node_of_row : (n_rows,) int32
     of_row : (n_rows,) int8
     nodes : (n_nodes,) int32
-        Nodes by their finest level; `node_cuts` (n_levels + 1,) says where each begins.
+        Nodes by their finest level, and in a level by the first element that they belong to, `first_of_node`;
+        `node_cuts` (n_levels + 1,) says where each level begins.
     row_order : (n_rows,) int32
-        Rows by level, with `row_cuts` (n_levels + 1,); `element_cuts` (n_levels + 1,) does so for elements.
+        Rows by level and first element, with `first_of_row` and `row_cuts`; `element_cuts` (n_levels + 1,) does so for
+        elements.
     """
 
     of_element: NDArray[np.int8]
@@ -50,8 +52,10 @@ class Levels:
     node_of_row: NDArray[np.int32]
     of_row: NDArray[np.int8]
     nodes: NDArray[np.int32]
+    first_of_node: NDArray[np.int32]
     node_cuts: NDArray[np.int64]
     row_order: NDArray[np.int32]
+    first_of_row: NDArray[np.int32]
     row_cuts: NDArray[np.int64]
     element_cuts: NDArray[np.int64]
 
@@ -165,17 +169,22 @@ def tie(elements, n_nodes, level):
     next_row[row[:-1][~first[1:]]] = row[1:][~first[1:]]
     number = np.full((n_nodes, count), -1, np.int32)
     number[node, of_pair] = row
-    nodes, rows = np.argsort(of_row[:n_nodes], kind="stable"), np.argsort(of_row, kind="stable")
+    row_of_corner = np.ascontiguousarray(number[elements, level[:, None]])
+    first_element = np.full(n_rows, len(elements), np.int32)
+    np.minimum.at(first_element, row_of_corner.ravel(), np.repeat(np.arange(len(elements), dtype=np.int32), 3))
+    nodes, rows = (np.lexsort((first_element[:k], of_row[:k])) for k in (n_nodes, n_rows))
     edges = np.arange(count + 1)
     return Levels(
         of_element=np.ascontiguousarray(level, np.int8),
-        rows=np.ascontiguousarray(number[elements, level[:, None]]),
+        rows=row_of_corner,
         next_row=next_row,
         node_of_row=node_of_row,
         of_row=of_row,
         nodes=nodes.astype(np.int32),
+        first_of_node=first_element[nodes],
         node_cuts=np.searchsorted(of_row[:n_nodes][nodes], edges),
         row_order=rows.astype(np.int32),
+        first_of_row=first_element[rows],
         row_cuts=np.searchsorted(of_row[rows], edges),
         element_cuts=np.searchsorted(level, edges),
     )

@@ -14,7 +14,7 @@ from mpm.clock import END, NOW, SMALLEST, SPAN, plan_step
 from mpm.contact import smooth_rates
 from mpm.jit import kernel, kernel_part
 from mpm.meeting import next_part, next_stage, take_part
-from mpm.points import cut_by_work, follow_points
+from mpm.points import Layout, cut_by_work, follow_points
 from mpm.variables import V_GX
 
 #: Of the process, in microseconds (POSIX).
@@ -51,7 +51,7 @@ class Net(NamedTuple):
     geometry: np.ndarray
     neighbours: np.ndarray
     level_of_element: np.ndarray
-    element_cuts: np.ndarray  # of the levels
+    layout: Layout
     volume: np.ndarray
     fill: np.ndarray
     which_node: np.ndarray
@@ -77,14 +77,6 @@ class Walls(NamedTuple):
     friction: np.ndarray
     velocity: np.ndarray | None
     impulse: np.ndarray
-
-
-class Cuts(NamedTuple):
-    """Where the lists of occupied elements, nodes and rows of each level are cut: (n_levels, n_parts + 1) int64."""
-
-    elements: np.ndarray
-    nodes: np.ndarray
-    rows: np.ndarray
 
 
 class Medium(NamedTuple):
@@ -159,7 +151,7 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
         """Note what the update of a substep found, and repair the list of points."""
         counts = tally.counts
         counts[SUBSTEPS] += 1
-        counts[POINT_STEPS] += ground.start[net.element_cuts[finished + 1]]
+        counts[POINT_STEPS] += ground.start[net.layout.element_cuts[finished + 1]]
         counts[SUSPENDED] = tally.suspended.sum()
         critical = np.inf
         for part in range(tally.n_left.size):
@@ -173,16 +165,16 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
                 counts[OCCUPIED], tally.spare_start, tally.spare_order,
             )  # fmt: skip
             tally.measures[REMOVED_MASS] += removed
-            cut_by_work(ground.start, ground.occupied, counts[OCCUPIED], net.element_cuts, finished + 1, cuts.elements)
+            cut_by_work(ground.start, ground.occupied, counts[OCCUPIED], net.layout, finished + 1, cuts)
 
     @kernel_part
     def finish(ground, net, cuts, clock, tally):
         """The end of a long step."""
-        follow(ground, net, cuts, clock, net.element_cuts.size - 2, tally)
+        follow(ground, net, cuts, clock, net.layout.element_cuts.size - 2, tally)
         clock.times[NOW] += clock.times[SPAN]
 
     @kernel_part
-    def plan(number, batch, ground, net, clock, pace, tally):
+    def plan(number, batch, ground, net, cuts, clock, pace, tally):
         """Begin a long step, if there shall be one more."""
         counts, times = tally.counts, clock.times
         enough = number == batch.limits.size
@@ -191,9 +183,12 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
             enough = enough or counts[POINT_STEPS] >= batch.most_point_steps
         if not enough:
             batch.substeps[number], batch.limits[number] = plan_step(
-                clock, pace, tally.limits, ground.start, ground.occupied, counts[OCCUPIED], net.element_cuts,
+                clock, pace, tally.limits, ground.start, ground.occupied, counts[OCCUPIED], net.layout.element_cuts,
                 net.level_of_element,
             )  # fmt: skip
+            for level in range(cuts.nodes.shape[0]):
+                for part in range(cuts.nodes.shape[1]):
+                    cuts.solved[level, part] = cuts.nodes[level, part]
 
     @kernel_part
     def substep(
@@ -211,7 +206,7 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
                 if part < parts:
                     for level in range(begun + 1):
                         solve_nodes(
-                            cuts.nodes[level, part], cuts.nodes[level, part + 1], net.which_node, net.next_row,
+                            cuts.solved[level, part], cuts.solved[level, part + 1], net.which_node, net.next_row,
                             net.level_of_row, begun, clock.dt_of_level, net.touched, net.sums, net.tied_means,
                             medium.gravity, medium.density_liquid, walls.fixed, walls.contact_of_node, walls.normal,
                             walls.active, walls.friction, walls.velocity, net.nodes, net.status, walls.impulse,
@@ -282,7 +277,7 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
             part = take_part(meeting, stage, thread, parts)
             while part >= 0:
                 left, suspended, bad, limit, limit_speed = 0, 0, -1, np.inf, 0.0
-                base = points_before(ground, net.element_cuts, cuts.elements, finished, part)
+                base = points_before(ground, net.layout.element_cuts, cuts.elements, finished, part)
                 for level in range(finished + 1):
                     more, wrong, loose, local, speed = update_points(
                         cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, ground.start,
@@ -330,7 +325,7 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
                     if number > 0:
                         finish(ground, net, cuts, clock, tally)
                         mark = lap(tally.used, FOLLOW, thread, mark)
-                    plan(number, batch, ground, net, clock, pace, tally)
+                    plan(number, batch, ground, net, cuts, clock, pace, tally)
                     part = next_part(meeting, stage, thread, 1)
                 stage = next_stage(meeting, stage, 1)
                 lap(tally.used, PLAN, thread, mark)

@@ -2,12 +2,33 @@
 
 import math
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
 from mpm.jit import LINE, index, integer_kernel, kernel, kernel_part
 from mpm.transfer import map_kernel
 from mpm.variables import C_RETURNED, MASS, POINT_WIDTH, S_RHO_S, SXX, SYY, SZZ, X0, Y0, N, P, X, Y
+
+
+class Layout(NamedTuple):
+    """Where the levels lie in the lists of elements, nodes and rows: see :class:`mpm.levels.Levels`."""
+
+    element_cuts: np.ndarray
+    node_cuts: np.ndarray
+    row_cuts: np.ndarray
+    first_of_node: np.ndarray
+    first_of_row: np.ndarray
+
+
+class Cuts(NamedTuple):
+    """Where the lists of occupied elements, nodes and rows of each level are cut: (n_levels, n_parts + 1) int64."""
+
+    elements: np.ndarray
+    nodes: np.ndarray
+    rows: np.ndarray
+    solved: np.ndarray  # `nodes` at the beginning of the long step: the others change while nodes are solved
+
 
 ELEMENT_WORK = 2  # what an element costs in a step beside its points, in points
 
@@ -182,11 +203,15 @@ def porosity_ranges(points, element_of_point, soil_of_point, n_soils):
     """Smallest and largest porosity of the points of each soil that are in an element: (n_soils, 2), else inf, -inf."""
     ranges = np.empty((n_soils, 2))
     ranges[:, 0], ranges[:, 1] = np.inf, -np.inf
-    for i in range(element_of_point.size):
-        if element_of_point[i] >= 0:
-            s = soil_of_point[i]
-            ranges[s, 0] = min(ranges[s, 0], points[i, N])
-            ranges[s, 1] = max(ranges[s, 1], points[i, N])
+    first = 0
+    while first < element_of_point.size:  # points of one soil follow each other
+        s, i, low, high = soil_of_point[first], first, np.inf, -np.inf
+        while i < element_of_point.size and soil_of_point[i] == s:
+            if element_of_point[i] >= 0:
+                low, high = min(low, points[i, N]), max(high, points[i, N])
+            i += 1
+        ranges[s, 0], ranges[s, 1] = min(ranges[s, 0], low), max(ranges[s, 1], high)
+        first = i
     return ranges
 
 
@@ -201,12 +226,11 @@ def mass_inside(points, element_of_point, x, y, radius):
 
 
 @kernel_part
-def place_of(element, occupied, n_occupied):
-    """Place of the first of the occupied elements that is not below one (numpy's takes two seconds to compile)."""
-    low, high = 0, n_occupied
+def place_of(value, ascending, low, high):
+    """First place in a range of an array that is not below a value (numpy's takes two seconds to compile)."""
     while low < high:
         middle = (low + high) // 2
-        if occupied[middle] < element:
+        if ascending[middle] < value:
             low = middle + 1
         else:
             high = middle
@@ -214,30 +238,33 @@ def place_of(element, occupied, n_occupied):
 
 
 @integer_kernel
-def cut_by_work(start, occupied, n_occupied, element_cuts, n_levels, cuts):
-    """Cut the occupied elements of the finest levels into parts of about as much work.
+def cut_by_work(start, occupied, n_occupied, layout, n_levels, cuts):
+    """Cut the occupied elements of the finest levels into parts of about as much work, and nodes and rows with them.
+
+    So whoever takes the same part of every pass finds most of what it needs where it left it, in its own cache.
 
     Parameters
     ----------
-    element_cuts : (n_levels + 1,) int
-        First element of each level.
-    cuts : (n_levels, n_parts + 1) int64
-        Written: places in the list of occupied elements; those of further levels are shifted with it.
+    layout : Layout
+    cuts : Cuts
+        Written, but for `solved`: places in the list of occupied elements, of nodes and of rows. The elements of
+        further levels are shifted with the list.
     """
-    parts = cuts.shape[1] - 1
-    change = n_occupied - cuts[-1, -1]
-    for level in range(n_levels, cuts.shape[0]):
+    parts = cuts.elements.shape[1] - 1
+    change = n_occupied - cuts.elements[-1, -1]
+    for level in range(n_levels, cuts.elements.shape[0]):
         for part in range(parts + 1):
-            cuts[level, part] += change
+            cuts.elements[level, part] += change
     end = 0
     for level in range(n_levels):
-        begin, after = start[element_cuts[level]], start[element_cuts[level + 1]]
-        first = end
-        end = place_of(element_cuts[level + 1], occupied, n_occupied)
+        begin, after = start[layout.element_cuts[level]], start[layout.element_cuts[level + 1]]
+        first = low = end
+        end = place_of(layout.element_cuts[level + 1], occupied, low, n_occupied)
         work = after - begin + ELEMENT_WORK * (end - first)
-        cuts[level, 0] = low = first
-        for part in range(1, parts):
-            high = end
+        node, last_node = layout.node_cuts[level], layout.node_cuts[level + 1]
+        row, last_row = layout.row_cuts[level], layout.row_cuts[level + 1]
+        for part in range(parts + 1):
+            high = first if part == 0 else end
             while low < high:
                 middle = (low + high) // 2
                 before = start[occupied[middle]] - begin + ELEMENT_WORK * (middle - first)
@@ -245,8 +272,13 @@ def cut_by_work(start, occupied, n_occupied, element_cuts, n_levels, cuts):
                     low = middle + 1
                 else:
                     high = middle
-            cuts[level, part] = low
-        cuts[level, parts] = end
+            if part == parts:
+                low, node, row = end, last_node, last_row
+            elif part > 0:
+                element = occupied[low] if low < end else layout.element_cuts[level + 1]
+                node = place_of(element, layout.first_of_node, node, last_node)
+                row = place_of(element, layout.first_of_row, row, last_row)
+            cuts.elements[level, part], cuts.nodes[level, part], cuts.rows[level, part] = low, node, row
 
 
 @kernel_part
@@ -345,7 +377,7 @@ def update_order(
         ranges[t, 0], ranges[t, 2] = start[e + 1], shift
         ranges[t, 1] = start[touched[t + 1]] if t + 1 < n_touched else start[n_elements]
         if (count > 0) != (before > 0):
-            place = place_of(e, occupied, n_occupied)
+            place = place_of(e, occupied, 0, n_occupied)
             if n_places > 0:
                 places[n_places - 1, 1] = place
             change += 1 if count > 0 else -1

@@ -32,7 +32,6 @@ from mpm.long_step import (
     SUBSTEPS,
     SUSPENDED,
     Batch,
-    Cuts,
     Ground,
     Medium,
     Net,
@@ -42,6 +41,8 @@ from mpm.long_step import (
 )
 from mpm.measures import Measures
 from mpm.points import (
+    Cuts,
+    Layout,
     cut_by_work,
     fill,
     initial_stress,
@@ -124,8 +125,8 @@ class Solver(Measures):
         mirrored = np.isin(self.levels.node_of_row, self.mirror_line)
         self._mirrored = mirrored if scene.is_half else mirrored[:0]
         self._build_contact()
-        cuts = np.zeros((self.levels.count, PARTS + 1), np.int64)
-        self._cuts = Cuts(cuts, _cut_evenly(self.levels.node_cuts), _cut_evenly(self.levels.row_cuts))
+        self._layout = Layout(*(getattr(self.levels, name) for name in Layout._fields))
+        self._cuts = Cuts(*np.zeros((4, self.levels.count, PARTS + 1), np.int64))
         self._counts, self._measures = np.zeros(5, np.int64), np.zeros(2)
         self._limits = np.zeros((2 * PARTS, 2))
         self._suspended, self._bad, self._n_left, self._first_left = np.zeros((4, PARTS), np.int64)
@@ -233,10 +234,7 @@ class Solver(Measures):
         self.n_occupied, self.n_active = sort_by_element(
             self.element_of_point, len(self.mesh.elements), self.start, self.order, self.occupied
         )
-        cut_by_work(
-            self.start, self.occupied, self.n_occupied, self.levels.element_cuts, self.levels.count,
-            self._cuts.elements,
-        )  # fmt: skip
+        cut_by_work(self.start, self.occupied, self.n_occupied, self._layout, self.levels.count, self._cuts)
 
     def _sort_physically(self):
         inside = self.order[: self.n_active]
@@ -420,7 +418,7 @@ class Solver(Measures):
                 self.soils,
             ),
             Net(
-                levels.rows, self.geometry, self.neighbours, levels.of_element, levels.element_cuts,
+                levels.rows, self.geometry, self.neighbours, levels.of_element, self._layout,
                 self.volume, self.fill, levels.nodes, levels.next_row, levels.of_row, levels.row_order,
                 self._mirrored, self.nodes, self.tied_means, self.status, self.touched, self.sums, self.means,
             ),
@@ -448,8 +446,3 @@ class Solver(Measures):
         if advance:
             self.step_count += int(counts[SUBSTEPS])
             self.point_steps += int(counts[POINT_STEPS])
-
-
-def _cut_evenly(cuts):
-    """Cut each range between two `cuts` (n + 1,) into parts of one size: (n, PARTS + 1) int64."""
-    return np.linspace(cuts[:-1], cuts[1:], PARTS + 1, axis=1).astype(np.int64)

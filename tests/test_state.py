@@ -16,7 +16,7 @@ BUILT = {
     "active", "friction", "lining", "threads", "initial_grain_mass", "initial", "_normal_open", "_active_open",
     "_closed", "workers", "_long_step", "_water_density", "_water_modulus", "start", "order", "occupied", "n_occupied",
     "n_active", "_cuts", "levels", "copies", "mirror_line", "_mirrored", "_used",
-    "moving", "wall", "clock", "touched", "_spectrum", "_altitude",
+    "moving", "wall", "clock", "_layout", "touched", "_spectrum", "_altitude",
 }  # fmt: skip
 #: Written by each step before it is read.
 SCRATCH = {
