@@ -57,15 +57,17 @@ def figure(data):
         axes[0, 0].axvline(data["reference_points_per_second"] / 1e6, color=GATE, label="reference loop")
         axes[0, 0].axvline(data["roofline_points_per_second"] / 1e6, color="0.3", ls="--", label="memory bound")
         axes[0, 0].set_xlabel("million point-steps per CPU second")
-        axes[0, 0].legend(loc="lower right", fontsize=6)
+        axes[0, 0].legend(loc="lower center", bbox_to_anchor=(0.3, 1.0), ncol=2, fontsize=6, frameon=False)
         kernels = data["kernels"]
         axes[0, 1].barh(list(kernels), [1e9 * s for s in kernels.values()], color=NOW)
         axes[0, 1].set_xlabel("CPU time of a point-step [ns]")
         sizes = [r["points"] for r in data["sizes"]]
-        axes[1, 0].loglog(sizes, [1e9 / r["points_per_second"] for r in data["sizes"]], "o-", color=NOW)
+        costs = [1e9 / r["points_per_second"] for r in data["sizes"]]
+        axes[1, 0].semilogx(sizes, costs, "o-", color=NOW)
+        axes[1, 0].set_ylim(0.0, 1.15 * max(costs))
         axes[1, 0].set_xlabel("points")
         axes[1, 0].set_ylabel("CPU time of a point-step [ns]")
-        axes[1, 0].set_title(f"cost of a step ~ points^{data['size_slope']:.2f}")
+        axes[1, 0].set_title(f"cost of a step ~ points^{data['size_slope']:.2f} (from 5000 on)")
         parts = [name for name in data["start"]["warm"] if name != "sum"]
         left = {"cold": 0.0, "warm": 0.0}
         for k, part in enumerate(parts):
@@ -76,6 +78,7 @@ def figure(data):
         axes[1, 1].legend(fontsize=6)
         for axis in axes.flat:
             axis.grid(True)
+            axis.set_axisbelow(True)
     return drawn
 
 
