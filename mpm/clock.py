@@ -8,6 +8,7 @@ from mpm.jit import kernel, kernel_part
 from mpm.levels import MOST_LEVELS
 
 ALMOST = 1.1  # a step shortened by less to meet an output time counts as limited by what limited it before
+ALMOST_ALL = 1 - 1e-12  # of the time until the end: what is left is rounding
 LIMITS = ("acoustic", "advective", "output")  # what a time step may be limited by
 (ACOUSTIC, ADVECTIVE, OUTPUT) = range(len(LIMITS))
 #: Places in `Clock.times` [s]: now, until when, length of the long step, step of level 0, where now and end count from.

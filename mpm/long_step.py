@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from mpm.clock import END, NOW, SMALLEST, SPAN, plan_step
+from mpm.clock import ALMOST_ALL, END, NOW, SMALLEST, SPAN, plan_step
 from mpm.contact import smooth_rates
 from mpm.jit import kernel, kernel_part
 from mpm.meeting import next_part, next_stage, take_part
@@ -29,7 +29,6 @@ PASSES = (
 (OCCUPIED, ACTIVE, SUSPENDED, SUBSTEPS, POINT_STEPS) = range(5)
 #: And in `Tally.measures`: the largest time step over the critical one it led to, mass of the points taken out.
 LARGEST_COURANT, REMOVED_MASS = range(2)
-ALMOST_ALL = 1 - 1e-12  # of the time until the end: what is left is rounding
 
 
 class Ground(NamedTuple):
@@ -191,123 +190,107 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
                     cuts.solved[level, part] = cuts.nodes[level, part]
 
     @kernel_part
+    def do_part(
+        which, part, k, thread, mark, advance, ground, net, walls, cuts, clock, pace, medium, tally
+    ):  # fmt: skip
+        """One part of a pass of substep `k`; returns the time now, as `lap`."""
+        parts, begun, finished = net.sums.shape[0], clock.begun[k], clock.finished[k]
+        if which == SOLVE and part == parts:
+            follow(ground, net, cuts, clock, clock.finished[k - 1], tally)
+            return lap(tally.used, FOLLOW, thread, mark)
+        if which == SOLVE:
+            for level in range(begun + 1):
+                solve_nodes(
+                    cuts.solved[level, part], cuts.solved[level, part + 1], net.which_node, net.next_row,
+                    net.level_of_row, begun, clock.dt_of_level, net.touched, net.sums, net.tied_means,
+                    medium.gravity, medium.density_liquid, walls.fixed, walls.contact_of_node, walls.normal,
+                    walls.active, walls.friction, walls.velocity, net.nodes, net.status, walls.impulse,
+                    tally.ledger[part],
+                )  # fmt: skip
+        elif which == ADVANCE:
+            for level in range(finished + 1):
+                advance_points(
+                    cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, ground.start,
+                    ground.order, ground.points, ground.soil_of_point, ground.soils, medium.density_liquid,
+                    net.rows, net.geometry, net.nodes, net.tied_means, net.level_of_element,
+                    clock.dt_of_level, clock.flip_of_level, clock.filter_of_level, net.touched[part],
+                    net.means[part],
+                )  # fmt: skip
+        elif which == REMAP:
+            for level in range(finished + 1):
+                remap_nodes(
+                    cuts.nodes[level, part], cuts.nodes[level, part + 1], net.which_node, net.next_row,
+                    net.level_of_row, finished, clock.dt_of_level, net.touched, net.means, net.sums,
+                    net.tied_means, walls.fixed, walls.contact_of_node, walls.normal, walls.active, walls.velocity,
+                    net.nodes, net.status,
+                )  # fmt: skip
+        elif which == RATES:
+            for level in range(finished + 1):
+                element_rates(
+                    cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, net.rows,
+                    net.geometry, net.nodes, net.volume, net.fill, net.means[part],
+                )  # fmt: skip
+        elif which == SMOOTH:
+            for level in range(finished + 1):
+                first, last = cuts.rows[level, part], cuts.rows[level, part + 1]
+                smooth_rates(
+                    first, last, net.which_row, net.touched, net.means, net.sums, net.nodes,
+                    net.fill,
+                )  # fmt: skip
+                if net.mirrored.size > 0:
+                    for j in range(first, last):
+                        if net.mirrored[net.which_row[j]]:
+                            net.nodes[net.which_row[j], V_GX] = 0.0
+        elif which == UPDATE:
+            left, suspended, bad, limit, limit_speed = 0, 0, -1, np.inf, 0.0
+            base = points_before(ground, net.layout.element_cuts, cuts.elements, finished, part)
+            for level in range(finished + 1):
+                more, wrong, loose, local, speed = update_points(
+                    cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, ground.start,
+                    ground.order, ground.points, ground.soil_of_point, ground.soils, medium.density_liquid,
+                    medium.bulk_liquid, net.rows, net.geometry, net.nodes, net.volume,
+                    net.fill, net.level_of_element, clock.dt_of_level, clock.ahead, advance, pace.wave_speed,
+                    ground.element_of_point, tally.clamps[part], net.touched[part], net.sums[part],
+                    tally.left[base + left :],
+                )  # fmt: skip
+                left += more
+                suspended += loose
+                bad = wrong if bad < 0 else bad
+                if local < limit:
+                    limit, limit_speed = local, speed
+            tally.first_left[part], tally.n_left[part] = base, left
+            tally.suspended[part], tally.bad[part] = suspended, bad
+            tally.limits[part, 0], tally.limits[part, 1] = limit, limit_speed
+            mark = lap(tally.used, UPDATE, thread, mark)
+            if bad < 0:
+                tally.limits[parts + part, 0], tally.limits[parts + part, 1] = locate(
+                    tally.left[base:], left, tally.origin[base:], ground.element_of_point, ground.points,
+                    ground.soil_of_point, ground.soils, medium.density_liquid, net.rows, net.geometry,
+                    net.neighbours, net.nodes, pace.wave_speed, net.level_of_element, finished,
+                    net.touched[part], net.sums[part], tally.clamps[part],
+                )  # fmt: skip
+            return lap(tally.used, LOCATE, thread, mark)
+        return lap(tally.used, which, thread, mark)
+
+    @kernel_part
     def substep(
         thread, meeting, stage, k, first_pass, last_pass, advance, ground, net, walls, cuts, clock, pace, medium, tally
     ):  # fmt: skip
         """A range of passes of substep `k` of the long step; returns the next stage, or -1 where a point went bad."""
-        parts = net.sums.shape[0]
-        begun, finished = clock.begun[k], clock.finished[k]
         mark = lap(tally.used, SOLVE, thread, 0)
-        if first_pass <= SOLVE:
-            # with them, as the last part: the list of points after the substep before, which nodes do not need
-            more = 1 if k > 0 and last_pass >= FOLLOW else 0
-            part = take_part(meeting, stage, thread, parts + more)
-            while part >= 0:
-                if part < parts:
-                    for level in range(begun + 1):
-                        solve_nodes(
-                            cuts.solved[level, part], cuts.solved[level, part + 1], net.which_node, net.next_row,
-                            net.level_of_row, begun, clock.dt_of_level, net.touched, net.sums, net.tied_means,
-                            medium.gravity, medium.density_liquid, walls.fixed, walls.contact_of_node, walls.normal,
-                            walls.active, walls.friction, walls.velocity, net.nodes, net.status, walls.impulse,
-                            tally.ledger[part],
-                        )  # fmt: skip
-                    mark = lap(tally.used, SOLVE, thread, mark)
-                else:
-                    follow(ground, net, cuts, clock, clock.finished[k - 1], tally)
-                    mark = lap(tally.used, FOLLOW, thread, mark)
-                part = next_part(meeting, stage, thread, parts + more)
-            stage = next_stage(meeting, stage, parts + more)
-            mark = lap(tally.used, SOLVE, thread, mark)
-        if first_pass <= ADVANCE <= last_pass:
+        for which in range(max(first_pass, SOLVE), min(last_pass, UPDATE) + 1):
+            parts = net.sums.shape[0]
+            if which == SOLVE and k > 0 and last_pass == FOLLOW:
+                parts += 1  # the last: the list of points after the substep before, which nodes do not need
             part = take_part(meeting, stage, thread, parts)
             while part >= 0:
-                for level in range(finished + 1):
-                    advance_points(
-                        cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, ground.start,
-                        ground.order, ground.points, ground.soil_of_point, ground.soils, medium.density_liquid,
-                        net.rows, net.geometry, net.nodes, net.tied_means, net.level_of_element,
-                        clock.dt_of_level, clock.flip_of_level, clock.filter_of_level, net.touched[part],
-                        net.means[part],
-                    )  # fmt: skip
+                mark = do_part(
+                    which, part, k, thread, mark, advance, ground, net, walls, cuts, clock, pace, medium, tally
+                )
                 part = next_part(meeting, stage, thread, parts)
             stage = next_stage(meeting, stage, parts)
-            mark = lap(tally.used, ADVANCE, thread, mark)
-        if first_pass <= REMAP <= last_pass:
-            part = take_part(meeting, stage, thread, parts)
-            while part >= 0:
-                for level in range(finished + 1):
-                    remap_nodes(
-                        cuts.nodes[level, part], cuts.nodes[level, part + 1], net.which_node, net.next_row,
-                        net.level_of_row, finished, clock.dt_of_level, net.touched, net.means, net.sums,
-                        net.tied_means, walls.fixed, walls.contact_of_node, walls.normal, walls.active, walls.velocity,
-                        net.nodes, net.status,
-                    )  # fmt: skip
-                part = next_part(meeting, stage, thread, parts)
-            stage = next_stage(meeting, stage, parts)
-            mark = lap(tally.used, REMAP, thread, mark)
-        if first_pass <= RATES <= last_pass:
-            part = take_part(meeting, stage, thread, parts)
-            while part >= 0:
-                for level in range(finished + 1):
-                    element_rates(
-                        cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, net.rows,
-                        net.geometry, net.nodes, net.volume, net.fill, net.means[part],
-                    )  # fmt: skip
-                part = next_part(meeting, stage, thread, parts)
-            stage = next_stage(meeting, stage, parts)
-            mark = lap(tally.used, RATES, thread, mark)
-        if first_pass <= SMOOTH <= last_pass:
-            part = take_part(meeting, stage, thread, parts)
-            while part >= 0:
-                for level in range(finished + 1):
-                    first, last = cuts.rows[level, part], cuts.rows[level, part + 1]
-                    smooth_rates(
-                        first, last, net.which_row, net.touched, net.means, net.sums, net.nodes,
-                        net.fill,
-                    )  # fmt: skip
-                    if net.mirrored.size > 0:
-                        for j in range(first, last):
-                            if net.mirrored[net.which_row[j]]:
-                                net.nodes[net.which_row[j], V_GX] = 0.0
-                part = next_part(meeting, stage, thread, parts)
-            stage = next_stage(meeting, stage, parts)
-            mark = lap(tally.used, SMOOTH, thread, mark)
-        if first_pass <= UPDATE <= last_pass:
-            part = take_part(meeting, stage, thread, parts)
-            while part >= 0:
-                left, suspended, bad, limit, limit_speed = 0, 0, -1, np.inf, 0.0
-                base = points_before(ground, net.layout.element_cuts, cuts.elements, finished, part)
-                for level in range(finished + 1):
-                    more, wrong, loose, local, speed = update_points(
-                        cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, ground.start,
-                        ground.order, ground.points, ground.soil_of_point, ground.soils, medium.density_liquid,
-                        medium.bulk_liquid, net.rows, net.geometry, net.nodes, net.volume,
-                        net.fill, net.level_of_element, clock.dt_of_level, clock.ahead, advance, pace.wave_speed,
-                        ground.element_of_point, tally.clamps[part], net.touched[part], net.sums[part],
-                        tally.left[base + left :],
-                    )  # fmt: skip
-                    left += more
-                    suspended += loose
-                    bad = wrong if bad < 0 else bad
-                    if local < limit:
-                        limit, limit_speed = local, speed
-                tally.first_left[part], tally.n_left[part] = base, left
-                tally.suspended[part], tally.bad[part] = suspended, bad
-                tally.limits[part, 0], tally.limits[part, 1] = limit, limit_speed
-                mark = lap(tally.used, UPDATE, thread, mark)
-                if bad < 0:
-                    tally.limits[parts + part, 0], tally.limits[parts + part, 1] = locate(
-                        tally.left[base:], left, tally.origin[base:], ground.element_of_point, ground.points,
-                        ground.soil_of_point, ground.soils, medium.density_liquid, net.rows, net.geometry,
-                        net.neighbours, net.nodes, pace.wave_speed, net.level_of_element, finished,
-                        net.touched[part], net.sums[part], tally.clamps[part],
-                    )  # fmt: skip
-                mark = lap(tally.used, LOCATE, thread, mark)
-                part = next_part(meeting, stage, thread, parts)
-            stage = next_stage(meeting, stage, parts)
-            mark = lap(tally.used, UPDATE, thread, mark)
-            if tally.bad.max() >= 0:
+            mark = lap(tally.used, which, thread, mark)
+            if which == UPDATE and tally.bad.max() >= 0:
                 return -1
         return stage
 

@@ -263,8 +263,9 @@ def cut_by_work(start, occupied, n_occupied, layout, n_levels, cuts):
         work = after - begin + ELEMENT_WORK * (end - first)
         node, last_node = layout.node_cuts[level], layout.node_cuts[level + 1]
         row, last_row = layout.row_cuts[level], layout.row_cuts[level + 1]
-        for part in range(parts + 1):
-            high = first if part == 0 else end
+        cuts.elements[level, 0], cuts.nodes[level, 0], cuts.rows[level, 0] = first, node, row
+        for part in range(1, parts):
+            high = end
             while low < high:
                 middle = (low + high) // 2
                 before = start[occupied[middle]] - begin + ELEMENT_WORK * (middle - first)
@@ -272,13 +273,11 @@ def cut_by_work(start, occupied, n_occupied, layout, n_levels, cuts):
                     low = middle + 1
                 else:
                     high = middle
-            if part == parts:
-                low, node, row = end, last_node, last_row
-            elif part > 0:
-                element = occupied[low] if low < end else layout.element_cuts[level + 1]
-                node = place_of(element, layout.first_of_node, node, last_node)
-                row = place_of(element, layout.first_of_row, row, last_row)
+            element = occupied[low] if low < end else layout.element_cuts[level + 1]
+            node = place_of(element, layout.first_of_node, node, last_node)
+            row = place_of(element, layout.first_of_row, row, last_row)
             cuts.elements[level, part], cuts.nodes[level, part], cuts.rows[level, part] = low, node, row
+        cuts.elements[level, parts], cuts.nodes[level, parts], cuts.rows[level, parts] = end, last_node, last_row
 
 
 @kernel_part

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mpm.clock import ALMOST_ALL
 from mpm.meshing import build_mesh
 from mpm.solver import RunFailed, Solver
 from mpm.state import restore_solver, solver_state
@@ -137,7 +138,7 @@ class Simulation:
         end = self._interval * output.interval
         if stop.time is not None:
             end = min(end, stop.time)
-        while solver.time < end * (1 - 1e-12) and not self._reached:
+        while solver.time < end * ALMOST_ALL and not self._reached:
             for limit in solver.advance(end, self._checked + STEPS_BETWEEN_CHECKS - solver.step_count):
                 self._limits[limit] = self._limits.get(limit, 0) + 1
             if solver.step_count - self._checked >= STEPS_BETWEEN_CHECKS:
@@ -147,8 +148,8 @@ class Simulation:
             self._report(limit)
             if pause is not None and pause():
                 return None
-        self.done = self._reached or (stop.time is not None and solver.time >= stop.time * (1 - 1e-12))
-        snapshot = self.done or solver.time >= self._next_snapshot * (1 - 1e-12)
+        self.done = self._reached or (stop.time is not None and solver.time >= stop.time * ALMOST_ALL)
+        snapshot = self.done or solver.time >= self._next_snapshot * ALMOST_ALL
         if snapshot:
             self._next_snapshot = solver.time + (output.snapshot_interval or np.inf)
         self._inside = False

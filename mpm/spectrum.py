@@ -42,6 +42,10 @@ KRYLOV = 10  # vectors: from a wrong mode within 0.4 % of the step that many mor
 MOST_RESTARTS = 40  # with the best mode of the vectors so far
 ROUNDS = 3  # of the step that the drag depends on, from below, at the first call
 
+GATHERINGS = 4  # stages in which the operator is set up
+# And those from one vector to the next; the first two where volume changes are smoothed.
+(DIVERGENCES, MEANS, FORCES, ACCELERATIONS, THROUGH_POINTS, IMAGE, ORTHOGONAL, UNIT) = range(8)
+
 # What an element sums over its points: volume, the share that takes its own rates, moduli and water's stiffness times
 # volume, its volume as spread over what is around over its own, and the upper triangles of the consistent masses of
 # grains and of water, row by row.
@@ -154,19 +158,15 @@ def spread_elements(first, last, occupied, rows, geometry, fill, held, row_volum
 
 
 @kernel_part
-def gather(thread, meeting, stage, ground, medium, o):
-    """Set the operator up for the points as they are; returns the next stage."""
+def gather_part(which, part, ground, medium, o):
+    """One part of a stage of setting the operator up for the points as they are."""
     parts = o.at_nodes.shape[0]
-    part = take_part(meeting, stage, thread, parts)
-    while part >= 0:
+    if which == 0:
         sum_points(
             o.element_cuts[part], o.element_cuts[part + 1], ground, medium, o.elements, o.rows, o.geometry, o.stiffened,
             o.undrained, o.held, o.at_nodes[part], o.at_rows[part],
         )  # fmt: skip
-        part = next_part(meeting, stage, thread, parts)
-    stage = next_stage(meeting, stage, parts)
-    part = take_part(meeting, stage, thread, parts)
-    while part >= 0:
+    elif which == 1:
         for i in range(o.node_cuts[part], o.node_cuts[part + 1]):
             for column in range(4):
                 total = 0.0
@@ -184,26 +184,18 @@ def gather(thread, meeting, stage, ground, medium, o):
                 o.at_rows[p, r, 0] = o.at_rows[p, r, 1] = 0.0
             o.fill[r] = volume / area if area > 0.0 else 0.0
             o.per_volume[r, 0] = 1.0 / volume if volume > 0.0 else 0.0
-        part = next_part(meeting, stage, thread, parts)
-    stage = next_stage(meeting, stage, parts)
-    part = take_part(meeting, stage, thread, parts)
-    while part >= 0:
+    elif which == 2:
         spread_elements(
             o.element_cuts[part], o.element_cuts[part + 1], ground.occupied, o.rows, o.geometry, o.fill, o.held,
             o.at_rows[part],
         )  # fmt: skip
-        part = next_part(meeting, stage, thread, parts)
-    stage = next_stage(meeting, stage, parts)
-    part = take_part(meeting, stage, thread, parts)
-    while part >= 0:
+    elif which == 3:
         for r in range(o.row_cuts[part], o.row_cuts[part + 1]):
             volume = 0.0
             for p in range(parts):
                 volume += o.at_rows[p, r, 0]
                 o.at_rows[p, r, 0] = 0.0
             o.per_volume[r, 1] = 1.0 / volume if volume > 0.0 else 0.0
-        part = next_part(meeting, stage, thread, parts)
-    return next_stage(meeting, stage, parts)
 
 
 @kernel_part
@@ -345,6 +337,76 @@ def krylov_kernel(wet):
                 returned[b, x] += held[k, m + 1] * u + held[k, m + 3] * v + held[k, m + 4] * w
                 returned[c, x] += held[k, m + 2] * u + held[k, m + 4] * v + held[k, m + 5] * w
 
+    @kernel_part
+    def krylov_part(which, part, j, ground, o, drag_time, basis, hessenberg):
+        """One part of a stage on the way from vector `j` to the next."""
+        parts, occupied = o.at_nodes.shape[0], ground.occupied
+        flat = basis.reshape(basis.shape[0], width * basis.shape[1])
+        velocity, image = basis[j], basis[j + 1]
+        if which == DIVERGENCES:
+            sum_divergences(
+                o.element_cuts[part], o.element_cuts[part + 1], occupied, o.elements, o.rows, o.geometry,
+                o.held, velocity, o.at_rows[part],
+            )  # fmt: skip
+        elif which == MEANS:
+            for r in range(o.row_cuts[part], o.row_cuts[part + 1]):
+                for phase in range(2):
+                    total = 0.0
+                    for p in range(parts):
+                        total += o.at_rows[p, r, phase]
+                        o.at_rows[p, r, phase] = 0.0
+                    o.divergence[r, phase] = total * o.per_volume[r, phase]
+        elif which == FORCES:
+            sum_forces(
+                o.element_cuts[part], o.element_cuts[part + 1], occupied, o.elements, o.rows, o.geometry, o.held,
+                velocity, o.smoothing, o.divergence, o.at_nodes[part],
+            )  # fmt: skip
+        elif which == ACCELERATIONS:
+            accelerate_nodes(
+                o.node_cuts[part],
+                o.node_cuts[part + 1],
+                o.at_nodes,
+                o.nodal,
+                drag_time,
+                o.step_of_node,
+                o.free,
+                o.acceleration,
+            )
+        elif which == THROUGH_POINTS:
+            through_points(
+                o.element_cuts[part], o.element_cuts[part + 1], occupied, o.elements, o.held, o.acceleration,
+                o.at_nodes[part],
+            )  # fmt: skip
+        elif which == IMAGE:
+            first, last = o.node_cuts[part], o.node_cuts[part + 1]
+            for i in range(first, last):
+                for x in range(width):
+                    total = 0.0
+                    for p in range(parts):
+                        total += o.at_nodes[p, i, x]
+                        o.at_nodes[p, i, x] = 0.0
+                    image[i, x] = -total / o.nodal[i, x // 2] if o.free[i, x % 2] else 0.0
+                    if not o.remapping:
+                        image[i, x] = -2.0 * o.acceleration[i, x] - image[i, x]
+            for k in range(j + 1):
+                o.dots[part, k] = product(flat[k], flat[j + 1], width * first, width * last)
+        elif which == ORTHOGONAL:
+            first, last = width * o.node_cuts[part], width * o.node_cuts[part + 1]
+            for k in range(j + 1):
+                share = o.dots[:, k].sum()
+                for i in range(first, last):
+                    flat[j + 1, i] -= share * flat[k, i]
+            o.dots[part, -1] = product(flat[j + 1], flat[j + 1], first, last)
+        elif which == UNIT:
+            norm = np.sqrt(o.dots[:, -1].sum())
+            scale = 1.0 / norm if norm > 0.0 else 0.0
+            for i in range(width * o.node_cuts[part], width * o.node_cuts[part + 1]):
+                flat[j + 1, i] *= scale
+            if part == 0:
+                for k in range(j + 1):
+                    hessenberg[k, j] = o.dots[:, k].sum()
+                hessenberg[j + 1, j] = norm
+
     @kernel
     def build_krylov(thread, meeting, stage, fresh, ground, medium, operator, drag_time, basis, hessenberg):
         """Arnoldi's process: orthonormal vectors that span the powers of the operator on the first of them.
@@ -361,102 +423,21 @@ def krylov_kernel(wet):
         hessenberg : (k + 1, k) float64
             Written; zeros at first.
         """
-        o = operator
-        parts = o.at_nodes.shape[0]
-        flat = basis.reshape(basis.shape[0], width * basis.shape[1])
-        occupied = ground.occupied
-        if fresh:
-            stage = gather(thread, meeting, stage, ground, medium, o)
+        parts = operator.at_nodes.shape[0]
+        for which in range(GATHERINGS if fresh else 0):
+            part = take_part(meeting, stage, thread, parts)
+            while part >= 0:
+                gather_part(which, part, ground, medium, operator)
+                part = next_part(meeting, stage, thread, parts)
+            stage = next_stage(meeting, stage, parts)
+        first_stage = DIVERGENCES if operator.smoothing else FORCES
         for j in range(hessenberg.shape[1]):
-            velocity, image = basis[j], basis[j + 1]
-            if o.smoothing:
+            for which in range(first_stage, UNIT + 1):
                 part = take_part(meeting, stage, thread, parts)
                 while part >= 0:
-                    sum_divergences(
-                        o.element_cuts[part], o.element_cuts[part + 1], occupied, o.elements, o.rows, o.geometry,
-                        o.held, velocity, o.at_rows[part],
-                    )  # fmt: skip
+                    krylov_part(which, part, j, ground, operator, drag_time, basis, hessenberg)
                     part = next_part(meeting, stage, thread, parts)
                 stage = next_stage(meeting, stage, parts)
-                part = take_part(meeting, stage, thread, parts)
-                while part >= 0:
-                    for r in range(o.row_cuts[part], o.row_cuts[part + 1]):
-                        for phase in range(2):
-                            total = 0.0
-                            for p in range(parts):
-                                total += o.at_rows[p, r, phase]
-                                o.at_rows[p, r, phase] = 0.0
-                            o.divergence[r, phase] = total * o.per_volume[r, phase]
-                    part = next_part(meeting, stage, thread, parts)
-                stage = next_stage(meeting, stage, parts)
-            part = take_part(meeting, stage, thread, parts)
-            while part >= 0:
-                sum_forces(
-                    o.element_cuts[part], o.element_cuts[part + 1], occupied, o.elements, o.rows, o.geometry, o.held,
-                    velocity, o.smoothing, o.divergence, o.at_nodes[part],
-                )  # fmt: skip
-                part = next_part(meeting, stage, thread, parts)
-            stage = next_stage(meeting, stage, parts)
-            part = take_part(meeting, stage, thread, parts)
-            while part >= 0:
-                accelerate_nodes(
-                    o.node_cuts[part],
-                    o.node_cuts[part + 1],
-                    o.at_nodes,
-                    o.nodal,
-                    drag_time,
-                    o.step_of_node,
-                    o.free,
-                    o.acceleration,
-                )
-                part = next_part(meeting, stage, thread, parts)
-            stage = next_stage(meeting, stage, parts)
-            part = take_part(meeting, stage, thread, parts)
-            while part >= 0:
-                through_points(
-                    o.element_cuts[part], o.element_cuts[part + 1], occupied, o.elements, o.held, o.acceleration,
-                    o.at_nodes[part],
-                )  # fmt: skip
-                part = next_part(meeting, stage, thread, parts)
-            stage = next_stage(meeting, stage, parts)
-            part = take_part(meeting, stage, thread, parts)
-            while part >= 0:
-                first, last = o.node_cuts[part], o.node_cuts[part + 1]
-                for i in range(first, last):
-                    for x in range(width):
-                        total = 0.0
-                        for p in range(parts):
-                            total += o.at_nodes[p, i, x]
-                            o.at_nodes[p, i, x] = 0.0
-                        image[i, x] = -total / o.nodal[i, x // 2] if o.free[i, x % 2] else 0.0
-                        if not o.remapping:
-                            image[i, x] = -2.0 * o.acceleration[i, x] - image[i, x]
-                for k in range(j + 1):
-                    o.dots[part, k] = product(flat[k], flat[j + 1], width * first, width * last)
-                part = next_part(meeting, stage, thread, parts)
-            stage = next_stage(meeting, stage, parts)
-            part = take_part(meeting, stage, thread, parts)
-            while part >= 0:
-                first, last = width * o.node_cuts[part], width * o.node_cuts[part + 1]
-                for k in range(j + 1):
-                    share = o.dots[:, k].sum()
-                    for i in range(first, last):
-                        flat[j + 1, i] -= share * flat[k, i]
-                o.dots[part, -1] = product(flat[j + 1], flat[j + 1], first, last)
-                part = next_part(meeting, stage, thread, parts)
-            stage = next_stage(meeting, stage, parts)
-            norm = np.sqrt(o.dots[:, -1].sum())
-            scale = 1.0 / norm if norm > 0.0 else 0.0
-            part = take_part(meeting, stage, thread, parts)
-            while part >= 0:
-                for i in range(width * o.node_cuts[part], width * o.node_cuts[part + 1]):
-                    flat[j + 1, i] *= scale
-                if part == 0:
-                    for k in range(j + 1):
-                        hessenberg[k, j] = o.dots[:, k].sum()
-                    hessenberg[j + 1, j] = norm
-                part = next_part(meeting, stage, thread, parts)
-            stage = next_stage(meeting, stage, parts)
 
     return build_krylov
 
