@@ -197,7 +197,7 @@ class Solver(Measures):
         tied = self.levels.count > 1
         undrained = scene.is_undrained
         dilatant = plastic and any(soil.dilatancy_angle > 0 for soil in scene.soils if soil.model != "elastic")
-        self._long_step = long_step_kernel(
+        self.kernels = (
             solve_nodes if wet and not undrained else one_velocity_kernel(undrained),
             advance_kernel(wet, undrained, tied, scene.numerics.remapping),
             remap_kernel(wet and not undrained, scene.numerics.remapping),
@@ -205,6 +205,7 @@ class Solver(Measures):
             update_kernel(wet, undrained, plastic, scene.numerics.volumetric_smoothing, dilatant, tied),
             locate_kernel(wet, undrained, tied),
         )
+        self._long_step = long_step_kernel(*self.kernels)
         self._water_density = scene.water.density if wet else 0.0
         self._water_modulus = scene.water.bulk_modulus if wet else 0.0
 

@@ -14,8 +14,8 @@ from mpm.state import ARRAYS, NUMBERS
 BUILT = {
     "scene", "mesh", "soils", "parts", "geometry", "neighbours", "fixed", "contact_of_node", "n_contact", "normal",
     "active", "friction", "lining", "threads", "initial_grain_mass", "initial", "_normal_open", "_active_open",
-    "_closed", "workers", "_long_step", "_water_density", "_water_modulus", "start", "order", "occupied", "n_occupied",
-    "n_active", "_cuts", "levels", "copies", "mirror_line", "_mirrored", "_used",
+    "_closed", "workers", "kernels", "_long_step", "_water_density", "_water_modulus", "start", "order", "occupied",
+    "n_occupied", "n_active", "_cuts", "levels", "copies", "mirror_line", "_mirrored", "_used",
     "moving", "wall", "clock", "_layout", "touched", "_spectrum", "_altitude",
 }  # fmt: skip
 #: Written by each step before it is read.

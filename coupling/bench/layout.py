@@ -37,13 +37,12 @@ def bytes_per_point_step(solver):
 def operations_per_point_step(solver):
     """Floating-point operations in the loops over points of a step's kernels: dict of kernel name to count."""
     counts = {}
-    substep = inspect.getclosurevars(solver._long_step.py_func).nonlocals["substep"]
-    kernels = inspect.getclosurevars(substep.py_func).nonlocals
-    for kernel in (kernels["advance_points"], kernels["update_points"]):
+    for kernel in solver.kernels:
         tree = ast.parse(textwrap.dedent(inspect.getsource(kernel.py_func)))
         function = next(node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef))
         loops = [node for node in ast.walk(function) if isinstance(node, ast.For) and _over_points(node)]
-        counts[kernel.py_func.__name__] = sum(_operations(loop) for loop in loops)
+        if loops:
+            counts[kernel.py_func.__name__] = sum(_operations(loop) for loop in loops)
     return counts
 
 
