@@ -25,26 +25,18 @@ from mpm.variables import (
     B_PLY,
     B_PSX,
     B_PSY,
-    B_Q,
     BUFFER_WIDTH,
-    NODAL_MEANS,
     NODAL_MOMENTA,
     V_DLX,
     V_DLY,
     V_DSX,
     V_DSY,
-    V_GX,
-    V_GY,
     V_LX,
     V_LY,
     V_ML,
     V_MS,
-    V_P,
     V_SX,
     V_SY,
-    V_TS,
-    V_WL,
-    V_WS,
 )
 
 FIXED_X, FIXED_Y, MIRROR_X = 1, 2, 4
@@ -93,8 +85,8 @@ def stop_rows(i, next_row, nodes, mean):
 
 @kernel_part
 def solve_nodes(
-    first, last, which, next_row, level_of_row, begun, dt_of_level, touched, sums, mean, gravity, density_liquid, fixed,
-    contact_of_node, normal, active, friction, wall, nodes, status, impulse, ledger,
+    first, last, which, next_row, level_of_row, begun, dt_of_level, touched, sums, mean, gravity, fixed, contact_of_node,
+    normal, active, friction, wall, nodes, status, impulse, ledger,
 ):  # fmt: skip
     """Add up the parts of a range of nodes and advance both phases by the time step of each node's finest level.
 
@@ -108,12 +100,12 @@ def solve_nodes(
         [s]
     touched : (n_parts, n_rows) uint8
         Whether a part may have added to a row; else it holds zeros, which are not read.
-    sums : (n_parts, n_rows, 13) float64
+    sums : (n_parts, n_rows, 12) float64
         What the parts of the mesh add to the rows; added in the order of the parts. Written: momenta of rows tied to
         a finer one, which follow the node.
     mean : (n_rows - n_nodes, 6) float64
         Of rows tied to a finer one: mean over their step so far of the velocity of the grains, and of the
-        velocities of both phases that strain (remapped or not).
+        velocities of both phases that strain, remapped.
     fixed, status : (n_nodes,) int8
         Bits of box boundary and mirror line; written: which constraints acted.
     contact_of_node : (n_nodes,) int32
@@ -122,8 +114,8 @@ def solve_nodes(
         Into the material; whether the wall is there; Coulomb coefficient [-].
     wall : (n_contact, 2) float64 or None
         Velocity of the wall [m/s]; None where all stand still, which compiles its motion out.
-    nodes : (n_rows, 16) float64
-        Written: new velocities, increments (over their whole step for tied rows), masses, pressure projection.
+    nodes : (n_rows, 10) float64
+        Written: new velocities, increments (over their whole step for tied rows), masses.
     impulse : (n_contact, 5) float64
         Added: dt times effective normal, water normal, tangential reaction [N s/m], the latter along
         (ny, -nx) on the material, and dt times the squares of the first two.
@@ -138,28 +130,21 @@ def solve_nodes(
         ms = ml = mn = dd = psx = psy = plx = ply = fx = fy = flx = fly = 0.0
         r = i
         while r >= 0:
-            ml_row = q = 0.0
             for part in range(sums.shape[0]):
                 if touched[part, r] == 0:
                     continue
                 ms += sums[part, r, B_MS]
-                ml_row += sums[part, r, B_ML]
+                ml += sums[part, r, B_ML]
                 mn += sums[part, r, B_MN]
                 dd += sums[part, r, B_D]
                 psx += sums[part, r, B_PSX]
                 psy += sums[part, r, B_PSY]
                 plx += sums[part, r, B_PLX]
                 ply += sums[part, r, B_PLY]
-                q += sums[part, r, B_Q]
                 fx += sums[part, r, B_FX]
                 fy += sums[part, r, B_FY]
                 flx += sums[part, r, B_FLX]
                 fly += sums[part, r, B_FLY]
-            ml += ml_row
-            if ml_row <= 0.0:
-                nodes[r, V_P] = 0.0
-            elif level_of_row[r] <= begun:
-                nodes[r, V_P] += q * density_liquid / ml_row
             r = next_row[r]
         if fixed[i] & MIRROR_X:  # the mirror image's momentum is the opposite
             psx = plx = 0.0
@@ -279,7 +264,7 @@ def one_velocity_kernel(undrained):
 
     @kernel_part
     def solve_one_velocity(
-        first, last, which, next_row, level_of_row, begun, dt_of_level, touched, sums, mean, gravity, density_liquid,
+        first, last, which, next_row, level_of_row, begun, dt_of_level, touched, sums, mean, gravity,
         fixed, contact_of_node, normal, active, friction, wall, nodes, status, impulse, ledger,
     ):  # fmt: skip
         """`solve_nodes` with one momentum equation a node: of the grains, or undrained, of the mixture.
@@ -296,7 +281,6 @@ def one_velocity_kernel(undrained):
             mass = ml = px = py = fx = fy = flx = fly = 0.0
             r = i
             while r >= 0:
-                ml_row = q = 0.0
                 for part in range(sums.shape[0]):
                     if touched[part, r] == 0:
                         continue
@@ -307,16 +291,9 @@ def one_velocity_kernel(undrained):
                     fy += sums[part, r, B_FY]
                     if undrained:
                         mass += sums[part, r, B_MN]
-                        ml_row += sums[part, r, B_ML]
-                        q += sums[part, r, B_Q]
+                        ml += sums[part, r, B_ML]
                         flx += sums[part, r, B_FLX]
                         fly += sums[part, r, B_FLY]
-                if undrained:
-                    ml += ml_row
-                    if ml_row <= 0.0:
-                        nodes[r, V_P] = 0.0
-                    elif level_of_row[r] <= begun:
-                        nodes[r, V_P] += q * density_liquid / ml_row
                 r = next_row[r]
             if fixed[i] & MIRROR_X:
                 px = 0.0
@@ -408,15 +385,12 @@ def one_velocity_kernel(undrained):
 
 
 @cache
-def remap_kernel(two_phase, remapping):
-    """Kernel `remap_nodes` for water that has a velocity of its own or not.
-
-    Without `remapping` velocities stay as solved.
-    """
+def remap_kernel(two_phase):
+    """Kernel `remap_nodes` for water that has a velocity of its own or not."""
 
     @kernel_part
     def remap_nodes(
-        first, last, which, next_row, level_of_row, finished, dt_of_level, touched, means, sums, mean, fixed,
+        first, last, which, next_row, level_of_row, finished, dt_of_level, touched, momenta, sums, mean, fixed,
         contact_of_node, normal, active, wall, nodes, status,
     ):  # fmt: skip
         """Nodal velocities from the updated point momenta (MUSL), under the constraints that acted in this step.
@@ -424,77 +398,76 @@ def remap_kernel(two_phase, remapping):
         Rows of levels up to `finished` have new momenta; the others keep the node's, which `solve_nodes` has followed
         in `sums`, and their own velocities become the mean over their step when it ends.
 
-        means : (n_parts, n_rows, 9) float64
-            The first four columns are those momenta, of `advance_points`; cleared for `element_rates`.
+        momenta : (n_parts, n_rows, 4) float64, of `advance_points`
+            Cleared with `sums` and `touched` where they have been read, for `update_points`.
         """
         n_nodes = nodes.shape[0] - mean.shape[0]
         for k in range(first, last):
             i = which[k]
             sx = sy = lx = ly = 0.0
-            if remapping:
-                r = i
-                while r >= 0:
-                    done = level_of_row[r] <= finished
-                    for part in range(means.shape[0]):
-                        if touched[part, r] == 0:
-                            continue
-                        if done:
-                            sx += means[part, r, 0]
-                            sy += means[part, r, 1]
-                            if two_phase:
-                                lx += means[part, r, 2]
-                                ly += means[part, r, 3]
-                            for column in range(NODAL_MOMENTA):
-                                means[part, r, column] = 0.0
-                        else:
-                            sx += sums[part, r, B_PSX]
-                            sy += sums[part, r, B_PSY]
-                            if two_phase:
-                                lx += sums[part, r, B_PLX]
-                                ly += sums[part, r, B_PLY]
-                    r = next_row[r]
+            r = i
+            while r >= 0:
+                done = level_of_row[r] <= finished
+                for part in range(momenta.shape[0]):
+                    if touched[part, r] == 0:
+                        continue
+                    if done:
+                        sx += momenta[part, r, 0]
+                        sy += momenta[part, r, 1]
+                        if two_phase:
+                            lx += momenta[part, r, 2]
+                            ly += momenta[part, r, 3]
+                        touched[part, r] = 0
+                        for column in range(NODAL_MOMENTA):
+                            momenta[part, r, column] = 0.0
+                        for column in range(BUFFER_WIDTH):
+                            sums[part, r, column] = 0.0
+                    else:
+                        sx += sums[part, r, B_PSX]
+                        sy += sums[part, r, B_PSY]
+                        if two_phase:
+                            lx += sums[part, r, B_PLX]
+                            ly += sums[part, r, B_PLY]
+                r = next_row[r]
             if nodes[i, V_MS] <= 0.0:
                 continue
-            if remapping:
-                sx /= nodes[i, V_MS]
-                sy /= nodes[i, V_MS]
+            sx /= nodes[i, V_MS]
+            sy /= nodes[i, V_MS]
+            if two_phase:
+                lx /= nodes[i, V_ML]
+                ly /= nodes[i, V_ML]
+            c = contact_of_node[i]
+            if c >= 0 and active[c]:
+                nx, ny = normal[c, 0], normal[c, 1]
+                if wall is not None:
+                    sx -= wall[c, 0]
+                    sy -= wall[c, 1]
+                    lx -= wall[c, 0]
+                    ly -= wall[c, 1]
+                if status[i] & SOLID_STICKS:
+                    sx = sy = 0.0
+                else:
+                    vn = nx * sx + ny * sy
+                    if status[i] & SOLID_HELD or vn < 0.0:
+                        sx -= vn * nx
+                        sy -= vn * ny
                 if two_phase:
-                    lx /= nodes[i, V_ML]
-                    ly /= nodes[i, V_ML]
-                c = contact_of_node[i]
-                if c >= 0 and active[c]:
-                    nx, ny = normal[c, 0], normal[c, 1]
-                    if wall is not None:
-                        sx -= wall[c, 0]
-                        sy -= wall[c, 1]
-                        lx -= wall[c, 0]
-                        ly -= wall[c, 1]
-                    if status[i] & SOLID_STICKS:
-                        sx = sy = 0.0
-                    else:
-                        vn = nx * sx + ny * sy
-                        if status[i] & SOLID_HELD or vn < 0.0:
-                            sx -= vn * nx
-                            sy -= vn * ny
-                    if two_phase:
-                        vn = nx * lx + ny * ly
-                        if status[i] & LIQUID_HELD or vn < 0.0:
-                            lx -= vn * nx
-                            ly -= vn * ny
-                    if wall is not None:
-                        sx += wall[c, 0]
-                        sy += wall[c, 1]
-                        lx += wall[c, 0]
-                        ly += wall[c, 1]
-                if fixed[i] & FIXED_X:
-                    sx = lx = 0.0
-                if fixed[i] & FIXED_Y:
-                    sy = ly = 0.0
-                nodes[i, V_SX], nodes[i, V_SY] = sx, sy
-                if two_phase:
-                    nodes[i, V_LX], nodes[i, V_LY] = lx, ly
-            else:
-                sx, sy, lx, ly = nodes[i, V_SX], nodes[i, V_SY], nodes[i, V_LX], nodes[i, V_LY]
+                    vn = nx * lx + ny * ly
+                    if status[i] & LIQUID_HELD or vn < 0.0:
+                        lx -= vn * nx
+                        ly -= vn * ny
+                if wall is not None:
+                    sx += wall[c, 0]
+                    sy += wall[c, 1]
+                    lx += wall[c, 0]
+                    ly += wall[c, 1]
+            if fixed[i] & FIXED_X:
+                sx = lx = 0.0
+            if fixed[i] & FIXED_Y:
+                sy = ly = 0.0
+            nodes[i, V_SX], nodes[i, V_SY] = sx, sy
+            if two_phase:
+                nodes[i, V_LX], nodes[i, V_LY] = lx, ly
             r = next_row[i]
             while r >= 0:
                 t = r - n_nodes
@@ -509,47 +482,3 @@ def remap_kernel(two_phase, remapping):
                 r = next_row[r]
 
     return remap_nodes
-
-
-@kernel_part
-def smooth_rates(first, last, which, touched, means, sums, nodes, fill):
-    """Nodal means of the divergences and of the gradient of the projected pressure (Detournay & Dzik 2006).
-
-    Within a level. What the step has read of these rows is cleared for what comes next.
-
-    which : (n_rows,) int32
-        The rows, by level.
-    touched : (n_parts, n_rows) uint8, cleared too.
-    means : (n_parts, n_rows, 9) float64, of `element_rates`. A row without weight keeps what it had.
-    fill : (n_rows,) float64
-        Written: volume over area of the elements with points [-].
-    sums : (n_parts, n_rows, 13) float64
-    """
-    for k in range(first, last):
-        i = which[k]
-        volume = ts = wet = ws = wl = gx = gy = spread = area = 0.0
-        for part in range(means.shape[0]):
-            if touched[part, i] == 0:
-                continue
-            touched[part, i] = 0
-            volume += means[part, i, 0]
-            ts += means[part, i, 1]
-            wet += means[part, i, 2]
-            ws += means[part, i, 3]
-            wl += means[part, i, 4]
-            gx += means[part, i, 5]
-            gy += means[part, i, 6]
-            spread += means[part, i, 7]
-            area += means[part, i, 8]
-            for column in range(NODAL_MEANS):
-                means[part, i, column] = 0.0
-            for column in range(BUFFER_WIDTH):
-                sums[part, i, column] = 0.0
-        if volume > 0.0:
-            fill[i] = volume / area
-            nodes[i, V_TS] = ts / volume
-        if wet > 0.0:
-            nodes[i, V_WS] = ws / wet
-            nodes[i, V_WL] = ws / wet + wl / spread
-            nodes[i, V_GX] = gx / wet
-            nodes[i, V_GY] = gy / wet

@@ -11,20 +11,17 @@ import numpy as np
 from numba import types
 
 from mpm.clock import ALMOST_ALL, END, NOW, SMALLEST, SPAN, plan_step
-from mpm.contact import smooth_rates
 from mpm.jit import kernel, kernel_part
 from mpm.meeting import next_part, next_stage, take_part
 from mpm.points import Layout, cut_by_work, follow_points
-from mpm.variables import V_GX
 
 #: Of the process, in microseconds (POSIX).
 processor_time = types.ExternalFunction("clock", types.int64())
 #: Passes of a substep, in their order, after one that plans the long step. A range of them may be run alone.
 PASSES = (
-    "plan_step", "solve_nodes", "advance_points", "remap_nodes", "element_rates", "smooth_rates", "update_points",
-    "locate", "follow_points",
+    "plan_step", "solve_nodes", "advance_points", "remap_nodes", "update_points", "locate", "follow_points",
 )  # fmt: skip
-(PLAN, SOLVE, ADVANCE, REMAP, RATES, SMOOTH, UPDATE, LOCATE, FOLLOW) = range(len(PASSES))
+(PLAN, SOLVE, ADVANCE, REMAP, UPDATE, LOCATE, FOLLOW) = range(len(PASSES))
 #: What the passes count, beside the arrays: places in `Tally.counts`.
 (OCCUPIED, ACTIVE, SUSPENDED, SUBSTEPS, POINT_STEPS) = range(5)
 #: And in `Tally.measures`: the largest time step over the critical one it led to, mass of the points taken out.
@@ -51,19 +48,16 @@ class Net(NamedTuple):
     neighbours: np.ndarray
     level_of_element: np.ndarray
     layout: Layout
-    volume: np.ndarray
-    fill: np.ndarray
+    contents: np.ndarray
     which_node: np.ndarray
     next_row: np.ndarray
     level_of_row: np.ndarray
-    which_row: np.ndarray
-    mirrored: np.ndarray  # (n_rows,) bool, or empty where no row lies on a mirror line
     nodes: np.ndarray
     tied_means: np.ndarray
     status: np.ndarray
     touched: np.ndarray  # (n_parts, n_rows) uint8
     sums: np.ndarray
-    means: np.ndarray
+    momenta: np.ndarray
 
 
 class Walls(NamedTuple):
@@ -142,7 +136,7 @@ def points_before(ground, element_cuts, cuts, finished, part):
 
 
 @cache
-def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, update_points, locate):
+def long_step_kernel(solve_nodes, advance_points, remap_nodes, update_points, locate):
     """Kernel `long_step` of the kernels that a scene needs."""
 
     @kernel_part
@@ -160,7 +154,7 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
         if tally.n_left.sum() > 0:
             counts[OCCUPIED], counts[ACTIVE], removed = follow_points(
                 tally.left, tally.first_left, tally.n_left, tally.origin, ground.element_of_point, ground.points,
-                ground.soil_of_point, ground.soils, net.volume, ground.start, ground.order, ground.occupied,
+                ground.soil_of_point, ground.soils, net.contents, ground.start, ground.order, ground.occupied,
                 counts[OCCUPIED], tally.spare_start, tally.spare_order,
             )  # fmt: skip
             tally.measures[REMOVED_MASS] += removed
@@ -203,7 +197,7 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
                 solve_nodes(
                     cuts.solved[level, part], cuts.solved[level, part + 1], net.which_node, net.next_row,
                     net.level_of_row, begun, clock.dt_of_level, net.touched, net.sums, net.tied_means,
-                    medium.gravity, medium.density_liquid, walls.fixed, walls.contact_of_node, walls.normal,
+                    medium.gravity, walls.fixed, walls.contact_of_node, walls.normal,
                     walls.active, walls.friction, walls.velocity, net.nodes, net.status, walls.impulse,
                     tally.ledger[part],
                 )  # fmt: skip
@@ -212,35 +206,18 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
                 advance_points(
                     cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, ground.start,
                     ground.order, ground.points, ground.soil_of_point, ground.soils, medium.density_liquid,
-                    net.rows, net.geometry, net.nodes, net.tied_means, net.level_of_element,
+                    net.rows, net.geometry, net.nodes, net.tied_means, net.contents, net.level_of_element,
                     clock.dt_of_level, clock.flip_of_level, clock.filter_of_level, net.touched[part],
-                    net.means[part],
+                    net.momenta[part],
                 )  # fmt: skip
         elif which == REMAP:
             for level in range(finished + 1):
                 remap_nodes(
                     cuts.nodes[level, part], cuts.nodes[level, part + 1], net.which_node, net.next_row,
-                    net.level_of_row, finished, clock.dt_of_level, net.touched, net.means, net.sums,
+                    net.level_of_row, finished, clock.dt_of_level, net.touched, net.momenta, net.sums,
                     net.tied_means, walls.fixed, walls.contact_of_node, walls.normal, walls.active, walls.velocity,
                     net.nodes, net.status,
                 )  # fmt: skip
-        elif which == RATES:
-            for level in range(finished + 1):
-                element_rates(
-                    cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, net.rows,
-                    net.geometry, net.nodes, net.volume, net.fill, net.means[part],
-                )  # fmt: skip
-        elif which == SMOOTH:
-            for level in range(finished + 1):
-                first, last = cuts.rows[level, part], cuts.rows[level, part + 1]
-                smooth_rates(
-                    first, last, net.which_row, net.touched, net.means, net.sums, net.nodes,
-                    net.fill,
-                )  # fmt: skip
-                if net.mirrored.size > 0:
-                    for j in range(first, last):
-                        if net.mirrored[net.which_row[j]]:
-                            net.nodes[net.which_row[j], V_GX] = 0.0
         elif which == UPDATE:
             left, suspended, bad, limit, limit_speed = 0, 0, -1, np.inf, 0.0
             base = points_before(ground, net.layout.element_cuts, cuts.elements, finished, part)
@@ -248,8 +225,8 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
                 more, wrong, loose, local, speed = update_points(
                     cuts.elements[level, part], cuts.elements[level, part + 1], ground.occupied, ground.start,
                     ground.order, ground.points, ground.soil_of_point, ground.soils, medium.density_liquid,
-                    medium.bulk_liquid, net.rows, net.geometry, net.nodes, net.volume,
-                    net.fill, net.level_of_element, clock.dt_of_level, clock.ahead, advance, pace.wave_speed,
+                    medium.bulk_liquid, net.rows, net.geometry, net.nodes, net.contents,
+                    net.level_of_element, clock.dt_of_level, clock.ahead, advance, pace.wave_speed,
                     ground.element_of_point, tally.clamps[part], net.touched[part], net.sums[part],
                     tally.left[base + left :],
                 )  # fmt: skip
@@ -266,7 +243,7 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, element_rates, up
                 tally.limits[parts + part, 0], tally.limits[parts + part, 1] = locate(
                     tally.left[base:], left, tally.origin[base:], ground.element_of_point, ground.points,
                     ground.soil_of_point, ground.soils, medium.density_liquid, net.rows, net.geometry,
-                    net.neighbours, net.nodes, pace.wave_speed, net.level_of_element, finished,
+                    net.neighbours, pace.wave_speed, net.level_of_element, finished,
                     net.touched[part], net.sums[part], tally.clamps[part],
                 )  # fmt: skip
             return lap(tally.used, LOCATE, thread, mark)

@@ -8,7 +8,25 @@ import numpy as np
 
 from mpm.jit import LINE, index, integer_kernel, kernel, kernel_part
 from mpm.transfer import map_kernel
-from mpm.variables import C_RETURNED, MASS, POINT_WIDTH, S_RHO_S, SXX, SYY, SZZ, X0, Y0, N, P, X, Y
+from mpm.variables import (
+    C_RETURNED,
+    E_PRESSURE,
+    E_VOLUME,
+    E_X,
+    E_Y,
+    MASS,
+    POINT_WIDTH,
+    S_RHO_S,
+    SXX,
+    SYY,
+    SZZ,
+    X0,
+    Y0,
+    N,
+    P,
+    X,
+    Y,
+)
 
 
 class Layout(NamedTuple):
@@ -404,15 +422,15 @@ def update_order(
 
 @kernel_part
 def follow_points(
-    left, first_left, n_left, origin, element_of_point, points, soil_of_point, soils, volume, start, order, occupied,
+    left, first_left, n_left, origin, element_of_point, points, soil_of_point, soils, contents, start, order, occupied,
     n_occupied, spare_start, spare_order,
 ):  # fmt: skip
     """Count the points that `locate` has found with the elements that hold them, and repair the sorting.
 
     left, origin : (n_points,) int32
         Those of each part from `first_left` on, `n_left` (n_parts,) int64 of them.
-    volume : (n_elements, 2) float64
-        Added: volumes of these points, and of those under pore pressure [m2].
+    contents : (n_elements, 4) float64, of `update_points`
+        Added: these points.
     Others as of `locate` and `update_order`.
 
     Returns
@@ -429,9 +447,10 @@ def follow_points(
             e = element_of_point[i]
             if e >= 0:
                 added = points[i, MASS] / (soils[soil_of_point[i], S_RHO_S] * (1.0 - points[i, N]))
-                volume[e, 0] += added
-                if points[i, P] > 0.0:
-                    volume[e, 1] += added
+                contents[e, E_VOLUME] += added
+                contents[e, E_PRESSURE] += added * max(points[i, P], 0.0)
+                contents[e, E_X] += added * points[i, X]
+                contents[e, E_Y] += added * points[i, Y]
             else:
                 removed += points[i, MASS]
             if e != origin[k]:
@@ -459,7 +478,7 @@ def locate_kernel(wet, undrained, tied):
     @kernel_part
     def locate(
         left, n_left, origin, element_of_point, points, soil_of_point, soils, density_liquid, rows, geometry,
-        neighbours, nodes, wave_speed, level_of_element, finished, touched, sums, clamps,
+        neighbours, wave_speed, level_of_element, finished, touched, sums, clamps,
     ):  # fmt: skip
         """Find the new element of every point that left its own, walking over neighbours, and map it there.
 
@@ -530,7 +549,7 @@ def locate_kernel(wet, undrained, tied):
             if e >= 0:
                 fastest = np.sqrt(
                     map_point(
-                        points[i], soils[soil_of_point[i]], density_liquid, rows[e], geometry[e], nodes, touched, sums
+                        points[i], soils[soil_of_point[i]], density_liquid, rows[e], geometry[e], touched, sums
                     )
                 )
                 local = geometry[e, 7] / ((wave_speed + fastest) * (1 << level_of_element[e]))

@@ -270,12 +270,6 @@ class Numerics(Part):
         second, not per step: the viscosity that it adds falls with the square of the mesh size.
     pressure_filter : float
         Share of a point's pore pressure that is drawn in each step to a smooth projection [-]; 0 is off.
-    volumetric_smoothing : bool
-        Mean volumetric strain rates over the elements around a node.
-    remapping : bool
-        Strain rates of nodal velocities that are mapped anew from the advanced points (MUSL, Sulsky, Zhou & Schreyer
-        1995); false: of those just solved, as before it (USL). That saves some percent of a step, but a node that a
-        point hardly touches strains without bound, and the critical step falls with its mass.
     critical_step : str
         Where the critical time step comes from: "altitude" of the elements over the wave speed, or "spectral", the
         largest eigenvalue of the points on their mesh, renewed now and then (`mpm.spectrum`).
@@ -286,21 +280,10 @@ class Numerics(Part):
     courant: float = Field(default=0.8, gt=0, le=1)
     pic_rate: Annotated[float, in_unit("1/s")] = Field(default=10.0, ge=0)
     pressure_filter: float = Field(default=0.4, ge=0, le=1)
-    volumetric_smoothing: bool = True
-    remapping: bool = True
     critical_step: Literal["altitude", "spectral"] = "spectral"
     local_time_stepping: bool = True
     relaxation_tolerance: float = Field(default=1e-5, gt=0, lt=1)
     max_relaxation_steps: int = Field(default=20000, ge=1, le=10_000_000)
-
-    @model_validator(mode="after")
-    def _check(self):
-        if not self.remapping and self.critical_step == "altitude":
-            raise ValueError(
-                "critical_step: must be 'spectral' where remapping is false, got 'altitude'; altitude over wave speed "
-                "does not see the small masses of nodes that then limit the step"
-            )
-        return self
 
 
 class Stop(Part):

@@ -26,11 +26,11 @@ from mpm.long_step import (
     OCCUPIED,
     PLAN,
     POINT_STEPS,
-    RATES,
     REMOVED_MASS,
     SOLVE,
     SUBSTEPS,
     SUSPENDED,
+    UPDATE,
     Batch,
     Ground,
     Medium,
@@ -45,7 +45,6 @@ from mpm.points import (
     Layout,
     cut_by_work,
     fill,
-    initial_stress,
     locate_kernel,
     porosity_ranges,
     sort_by_element,
@@ -54,17 +53,21 @@ from mpm.spectrum import Spectrum, spectral_time_step
 from mpm.tables import element_geometry, element_neighbours, outflow_nodes, soil_table
 from mpm.threads import Threads
 from mpm.time_step import dry_wave_speed, fast_wave_speed
-from mpm.transfer import advance_kernel, rates_kernel, update_kernel
+from mpm.transfer import advance_kernel, update_kernel
 from mpm.variables import (
     BUFFER_WIDTH,
     CLAMPS,
+    E_PRESSURE,
+    E_VOLUME,
+    E_X,
+    E_Y,
+    ELEMENT_CONTENTS,
     LEDGER,
     MASS,
-    NODAL_MEANS,
+    NODAL_MOMENTA,
     NODE_WIDTH,
     S_G,
     S_LAMBDA,
-    V_P,
     P,
     X,
     Y,
@@ -79,7 +82,6 @@ FEWEST_BETWEEN_SPECTRA, MOST_BETWEEN_SPECTRA, MOST_BETWEEN_SPECTRA_OF_LEVELS = 5
 MOST_AT_ONCE = 2_000_000  # point-steps after which compiled code comes back: some tenth of a second
 # Of the spectral step over that of the altitude. Beyond, a few points resist nothing where they are: no estimate.
 MOST_OVER_ALTITUDE = 4.0
-LEAST_OVER_ALTITUDE = 1e-3  # without remapping a node that a point hardly touches takes less: the run would stand still
 SMALLEST_PARALLEL = 4000  # elements; below it a second thread costs more than it brings
 
 
@@ -122,8 +124,6 @@ class Solver(Measures):
         self.fixed[mesh.bottom] |= FIXED_X | FIXED_Y
         self.mirror_line = mesh.left if scene.is_half else mesh.left[:0]
         self.fixed[self.mirror_line] |= MIRROR_X
-        mirrored = np.isin(self.levels.node_of_row, self.mirror_line)
-        self._mirrored = mirrored if scene.is_half else mirrored[:0]
         self._build_contact()
         self._layout = Layout(*(getattr(self.levels, name) for name in Layout._fields))
         self._cuts = Cuts(*np.zeros((4, self.levels.count, PARTS + 1), np.int64))
@@ -136,12 +136,11 @@ class Solver(Measures):
         self.occupied = np.zeros(m, np.int32)
         self.touched = np.ones((PARTS, n_rows), np.uint8)  # which rows the parts may have added to
         self.sums = np.zeros((PARTS, n_rows, BUFFER_WIDTH))
-        self.means = np.zeros((PARTS, n_rows, NODAL_MEANS))
+        self.momenta = np.zeros((PARTS, n_rows, NODAL_MOMENTA))
         self.nodes = np.zeros((n_rows, NODE_WIDTH))
         self.tied_means = np.zeros((n_rows - n, 6))
         self.status = np.zeros(n, np.int8)
-        self.volume = np.zeros((m, 2))
-        self.fill = np.zeros(n_rows)
+        self.contents = np.zeros((m, ELEMENT_CONTENTS))
         self.clock = Clock.of(self.levels)
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
         self.threads = 1 if m < SMALLEST_PARALLEL else max(1, min(threads or cores, PARTS))
@@ -160,9 +159,6 @@ class Solver(Measures):
         self.estimate_interval, self.next_estimate = STEPS_BETWEEN_SORTS, 0  # long steps between estimates of the step
         self._sort()
         self._update_wave_speed()
-        # the projection of the initial pore pressure: hydrostatic, exact for linear functions
-        _, pressure = initial_stress(scene, -mesh.nodes[:, 1])
-        self.set_projected_pressure(pressure)
         self._mapped = False  # whether `sums` holds the points as they are
         self.removed_mass = 0.0
         self.suspended = 0
@@ -185,10 +181,6 @@ class Solver(Measures):
         self._altitude = self.geometry[:, 7] / 2.0**level  # in steps of level 0
         return mesh
 
-    def set_projected_pressure(self, pressure):
-        """Start the projection of the pore pressure from values at the nodes, (n_nodes,) float64 [Pa]."""
-        self.nodes[:, V_P] = pressure[self.levels.node_of_row]
-
     def _choose_kernels(self):
         """Kernels compiled for what the scene has, and nothing else."""
         scene = self.scene
@@ -196,13 +188,11 @@ class Solver(Measures):
         plastic = any(soil.model == "mohr-coulomb" for soil in scene.soils)
         tied = self.levels.count > 1
         undrained = scene.is_undrained
-        dilatant = plastic and any(soil.dilatancy_angle > 0 for soil in scene.soils if soil.model != "elastic")
         self.kernels = (
             solve_nodes if wet and not undrained else one_velocity_kernel(undrained),
-            advance_kernel(wet, undrained, tied, scene.numerics.remapping),
-            remap_kernel(wet and not undrained, scene.numerics.remapping),
-            rates_kernel(wet, undrained),
-            update_kernel(wet, undrained, plastic, scene.numerics.volumetric_smoothing, dilatant, tied),
+            advance_kernel(wet, undrained, tied),
+            remap_kernel(wet and not undrained),
+            update_kernel(wet, undrained, plastic, tied),
             locate_kernel(wet, undrained, tied),
         )
         self._long_step = long_step_kernel(*self.kernels)
@@ -270,14 +260,6 @@ class Solver(Measures):
             step, self.mode = spectral_time_step(self._spectrum.of_state(), certain, self.mode)
             if step > MOST_OVER_ALTITUDE * shortest / self.wave_speed:
                 step = 0.5 * shortest / self.wave_speed
-            if step < LEAST_OVER_ALTITUDE * shortest / self.wave_speed and not self.scene.numerics.remapping:
-                components = 4 if self.scene.is_two_phase else 2
-                raise RunFailed(
-                    f"the time step fell to {step:.2g} s, which nodes that points hardly touch need without remapping; "
-                    "set remapping = true in [numerics]",
-                    self.time,
-                    self.mesh.nodes[int(np.argmax(np.abs(self.mode))) // components],
-                )
             most = MOST_BETWEEN_SPECTRA if self.levels.count == 1 else MOST_BETWEEN_SPECTRA_OF_LEVELS
             fallen = step < 0.9 * self.longest_step
             self.estimate_interval = FEWEST_BETWEEN_SPECTRA if fallen else min(2 * self.estimate_interval, most)
@@ -310,12 +292,13 @@ class Solver(Measures):
     def map_points(self):
         """Sum the points at the nodes without advancing anything; sets the limits of the time step."""
         inside = self.element_of_point >= 0
-        element, volume = self.element_of_point[inside], self._volumes()[inside]
-        self.volume[:, 0] = np.bincount(element, volume, len(self.volume))
-        self.volume[:, 1] = np.bincount(element, volume * (self.points[inside, P] > 0), len(self.volume))
-        self.touched[:] = 1
+        element, volume, points = self.element_of_point[inside], self._volumes()[inside], self.points[inside]
+        weights = {E_VOLUME: 1.0, E_PRESSURE: np.maximum(points[:, P], 0.0), E_X: points[:, X], E_Y: points[:, Y]}
+        for column, weight in weights.items():
+            self.contents[:, column] = np.bincount(element, volume * weight, len(self.contents))
+        self.sums[:] = 0.0
         self.clock.map_only()
-        self._run(RATES, FOLLOW, advance=False)
+        self._run(UPDATE, FOLLOW, advance=False)
         self._mapped = True
 
     def relax(self, progress=None):
@@ -420,8 +403,8 @@ class Solver(Measures):
             ),
             Net(
                 levels.rows, self.geometry, self.neighbours, levels.of_element, self._layout,
-                self.volume, self.fill, levels.nodes, levels.next_row, levels.of_row, levels.row_order,
-                self._mirrored, self.nodes, self.tied_means, self.status, self.touched, self.sums, self.means,
+                self.contents, levels.nodes, levels.next_row, levels.of_row, self.nodes, self.tied_means, self.status,
+                self.touched, self.sums, self.momenta,
             ),
             Walls(
                 self.fixed, self.contact_of_node, self.normal, self.active, self.friction, self.wall, self.impulse

@@ -5,14 +5,8 @@ that, for every mode with stiffness k, mass m and drag c (implicit), z obeys (m 
     (m + dt c) z^2 - (2 m + dt c - dt^2 k) z + m = 0,
 whose roots leave the unit circle at z = -1, that is where dt^2 k = 4 m + 2 dt c. So the critical step is
 dt = 2 / sqrt(lambda) with the largest eigenvalue lambda of the stiffness over the mass plus dt/2 times the drag.
-The stiffness holds what the kernels hold: mean volume changes, element strains, pore water; the mass is that of the
-nodes, twice, with the points between (velocities return to the nodes through them, MUSL), which takes the shortest
+The stiffness holds what the kernels hold: element strains, pore water; the mass is that of the nodes, twice, with the points between (velocities return to the nodes through them, MUSL), which takes the shortest
 waves of consistent-mass kind away. Altitude over wave speed knows none of this.
-
-Without remapping (USL) strains follow the solved velocities u + dt a, only the points take the way S from the nodes to
-the points and back: u' = u + dt S a, x' = x + dt (u + dt a). At z = -1 these are dt^2 (2 - S) k = 4 m: the way is not
-taken off the acceleration, but from twice of it, and what damps waves, (1 - S) dt^2 k / m a step, lowers the limit.
-With drag this is on the safe side: the implicit drag then counts (2 - S) times.
 
 With local time stepping the step of level 0 is sought for which the same holds when the stiffness of every element is
 multiplied by the square of its own step over that of level 0, and the drag of a node by the step of its finest level.
@@ -20,7 +14,6 @@ Where the stress that acts runs ahead by a share a of a step, dt^2 k (1 + 2 a) =
 
 With a share s of PIC velocities are multiplied by g = 1 - s + s f in a step, where 0 <= f <= 1 is what the way
 through the points leaves of the mode; then dt^2 k = 2 (1 + g) m, and dt sqrt(1 - s/2) is not above any of these.
-Without remapping it is dt^2 k = 2 (1 + g) m / (1 + g - S), which PIC raises.
 """
 
 import math
@@ -33,8 +26,7 @@ from mpm.contact import FIXED_X, FIXED_Y, free_pair
 from mpm.jit import index, kernel, kernel_part
 from mpm.long_step import Ground, Medium
 from mpm.meeting import next_part, next_stage, take_part
-from mpm.transfer import spread_volume
-from mpm.variables import MASS, S_DRAG, S_G, S_LAMBDA, S_RHO_S, S_SIN_DIL, N, X, Y
+from mpm.variables import MASS, S_DRAG, S_G, S_LAMBDA, S_RHO_S, N, X, Y
 
 SAFETY = 0.9  # Ritz values come from below, and points move until the next estimate
 TOLERANCE = 1e-2  # of the largest eigenvalue
@@ -42,47 +34,38 @@ KRYLOV = 10  # vectors: from a wrong mode within 0.4 % of the step that many mor
 MOST_RESTARTS = 40  # with the best mode of the vectors so far
 ROUNDS = 3  # of the step that the drag depends on, from below, at the first call
 
-GATHERINGS = 4  # stages in which the operator is set up
-# And those from one vector to the next; the first two where volume changes are smoothed.
-(DIVERGENCES, MEANS, FORCES, ACCELERATIONS, THROUGH_POINTS, IMAGE, ORTHOGONAL, UNIT) = range(8)
+GATHERINGS = 2  # stages in which the operator is set up
+# And those from one vector to the next.
+(FORCES, ACCELERATIONS, THROUGH_POINTS, IMAGE, ORTHOGONAL, UNIT) = range(6)
 
-# What an element sums over its points: volume, the share that takes its own rates, moduli and water's stiffness times
-# volume, its volume as spread over what is around over its own, and the upper triangles of the consistent masses of
-# grains and of water, row by row.
-(E_V, E_OWN, E_LAMBDA, E_G, E_QS, E_QL, E_SPREAD) = range(7)
-E_GRAINS, E_WATER, ELEMENT_WIDTH = 7, 13, 19
+# What an element sums over its points: moduli and water's stiffness times volume, and the upper triangles of the
+# consistent masses of grains and of water, row by row.
+(E_LAMBDA, E_G, E_QS, E_QL) = range(4)
+E_GRAINS, E_WATER, ELEMENT_WIDTH = 4, 10, 16
 
 
 class Operator(NamedTuple):
     """What the largest eigenvalue is sought of, and arrays for the way there; those of parts are zeros between uses."""
 
     elements: np.ndarray
-    rows: np.ndarray
     geometry: np.ndarray
     stiffened: np.ndarray
     fixed: np.ndarray
     step_of_node: np.ndarray
     undrained: bool
-    smoothing: bool
-    remapping: bool
     held: np.ndarray
     nodal: np.ndarray
-    fill: np.ndarray
-    per_volume: np.ndarray  # (n_rows, 2) one over volume and spread volume around a row, 0 where there is none
     free: np.ndarray  # (n_nodes, 2) bool
     element_cuts: np.ndarray  # (n_parts + 1,) as the others; of the occupied elements
-    row_cuts: np.ndarray
     node_cuts: np.ndarray
     at_nodes: np.ndarray  # (n_parts, n_nodes, 4) what parts sum there, one after the other: masses, forces, momenta
-    at_rows: np.ndarray  # (n_parts, n_rows, 2) volumes, divergences
-    divergence: np.ndarray  # (n_rows, 2)
     acceleration: np.ndarray  # (n_nodes, 4 or 2)
     dots: np.ndarray  # (n_parts, KRYLOV + 1)
 
 
 @kernel_part
 def sum_points(
-    first, last, ground, medium, elements, rows, geometry, stiffened, undrained, held, nodal, row_volume
+    first, last, ground, medium, elements, geometry, stiffened, undrained, held, nodal
 ):  # fmt: skip
     """Sum the points of a range of elements in these and at the nodes.
 
@@ -90,12 +73,10 @@ def sum_points(
         Factor of the stiffness of an element.
     undrained : bool
         The pore water moves with the grains: its mass counts as theirs.
-    held : (n_elements, 19) float64
+    held : (n_elements, 16) float64
         Written, the occupied elements one after the other: see the columns `E_`.
     nodal : (n_nodes, 4) float64
         Added: masses of grains, of water as if it filled all, of pore water [kg/m]; drag [kg/m/s].
-    row_volume : (n_rows, 2) float64
-        Added: volume and area of the elements around [m2].
     """
     points, soils = ground.points, ground.soils
     for k in range(first, last):
@@ -115,9 +96,6 @@ def sum_points(
             stiff = volume * stiffened[e]
             if undrained:
                 mass += n * water
-            held[k, E_V] += volume
-            if soils[s, S_SIN_DIL] > 0.0:
-                held[k, E_OWN] += volume
             held[k, E_LAMBDA] += stiff * soils[s, S_LAMBDA]
             held[k, E_G] += stiff * soils[s, S_G]
             held[k, E_QS] += stiff * medium.bulk_liquid * (1.0 - n) / n
@@ -133,28 +111,6 @@ def sum_points(
                 nodal[c, 1] += weight[a] * water
                 nodal[c, 2] += weight[a] * n * water
                 nodal[c, 3] += weight[a] * n * water * soils[s, S_DRAG]
-        held[k, E_OWN] /= held[k, E_V]
-        for a in range(3):
-            r = index(rows[e, a])
-            row_volume[r, 0] += held[k, E_V]
-            row_volume[r, 1] += geometry[e, 6]
-
-
-@kernel_part
-def spread_elements(first, last, occupied, rows, geometry, fill, held, row_volume):
-    """Spread the volumes of a range of elements as the step does (`mpm.transfer.spread_volume`); sums them at the rows.
-
-    fill, row_volume : (n_rows,), (n_rows, 2) float64
-        Volume over area of the elements around a row; added to its first column: spread volumes [m2].
-    """
-    for k in range(first, last):
-        e = index(occupied[k])
-        a, b, c = index(rows[e, 0]), index(rows[e, 1]), index(rows[e, 2])
-        spread = spread_volume(held[k, E_V], geometry[e, 6], fill[a], fill[b], fill[c])
-        held[k, E_SPREAD] = spread / held[k, E_V]
-        row_volume[a, 0] += spread
-        row_volume[b, 0] += spread
-        row_volume[c, 0] += spread
 
 
 @kernel_part
@@ -163,8 +119,8 @@ def gather_part(which, part, ground, medium, o):
     parts = o.at_nodes.shape[0]
     if which == 0:
         sum_points(
-            o.element_cuts[part], o.element_cuts[part + 1], ground, medium, o.elements, o.rows, o.geometry, o.stiffened,
-            o.undrained, o.held, o.at_nodes[part], o.at_rows[part],
+            o.element_cuts[part], o.element_cuts[part + 1], ground, medium, o.elements, o.geometry, o.stiffened,
+            o.undrained, o.held, o.at_nodes[part],
         )  # fmt: skip
     elif which == 1:
         for i in range(o.node_cuts[part], o.node_cuts[part + 1]):
@@ -176,60 +132,16 @@ def gather_part(which, part, ground, medium, o):
                 o.nodal[i, column] = total
             o.free[i, 0] = o.nodal[i, 0] > 0.0 and not o.fixed[i] & FIXED_X
             o.free[i, 1] = o.nodal[i, 0] > 0.0 and not o.fixed[i] & FIXED_Y
-        for r in range(o.row_cuts[part], o.row_cuts[part + 1]):
-            volume = area = 0.0
-            for p in range(parts):
-                volume += o.at_rows[p, r, 0]
-                area += o.at_rows[p, r, 1]
-                o.at_rows[p, r, 0] = o.at_rows[p, r, 1] = 0.0
-            o.fill[r] = volume / area if area > 0.0 else 0.0
-            o.per_volume[r, 0] = 1.0 / volume if volume > 0.0 else 0.0
-    elif which == 2:
-        spread_elements(
-            o.element_cuts[part], o.element_cuts[part + 1], ground.occupied, o.rows, o.geometry, o.fill, o.held,
-            o.at_rows[part],
-        )  # fmt: skip
-    elif which == 3:
-        for r in range(o.row_cuts[part], o.row_cuts[part + 1]):
-            volume = 0.0
-            for p in range(parts):
-                volume += o.at_rows[p, r, 0]
-                o.at_rows[p, r, 0] = 0.0
-            o.per_volume[r, 1] = 1.0 / volume if volume > 0.0 else 0.0
 
 
 @kernel_part
-def sum_divergences(first, last, occupied, elements, rows, geometry, held, velocity, divergence):
-    """Add the divergences of the grains and of the water relative to them, times volumes, to rows: (n_rows, 2)."""
-    wet = velocity.shape[1] == 4
-    for k in range(first, last):
-        e = index(occupied[k])
-        a, b, c = index(elements[e, 0]), index(elements[e, 1]), index(elements[e, 2])
-        before, weight = 0.0, held[k, E_V]
-        for phase in range(2 if wet else 1):
-            x, y = 2 * phase, 2 * phase + 1
-            rate = geometry[e, 0] * (velocity[b, x] - velocity[a, x]) + geometry[e, 2] * (
-                velocity[c, x] - velocity[a, x]
-            )
-            rate += geometry[e, 1] * (velocity[b, y] - velocity[a, y]) + geometry[e, 3] * (
-                velocity[c, y] - velocity[a, y]
-            )
-            for corner in range(3):
-                divergence[index(rows[e, corner]), phase] += weight * (rate - before)
-            before, weight = rate, held[k, E_V] * held[k, E_SPREAD]
-
-
-@kernel_part
-def sum_forces(first, last, occupied, elements, rows, geometry, held, velocity, smoothing, divergence, force):
+def sum_forces(first, last, occupied, elements, geometry, held, velocity, force):
     """Add the forces of the stresses that `velocity` builds in a second to the nodes.
 
-    divergence : (n_rows, 2) float64
-        Means at the rows, of the grains and of the water relative to them; used where `smoothing`.
     force : (n_nodes, 4) float64
         Of the mixture, and of the pore pressure on the water.
     """
     wet = velocity.shape[1] == 4
-    third = 1.0 / 3.0
     for k in range(first, last):
         e = index(occupied[k])
         a, b, c = index(elements[e, 0]), index(elements[e, 1]), index(elements[e, 2])
@@ -238,25 +150,14 @@ def sum_forces(first, last, occupied, elements, rows, geometry, held, velocity, 
         uy1, uy2 = velocity[b, 1] - velocity[a, 1], velocity[c, 1] - velocity[a, 1]
         xx, yy = g1x * ux1 + g2x * ux2, g1y * uy1 + g2y * uy2
         xy = 0.5 * (g1y * ux1 + g2y * ux2 + g1x * uy1 + g2x * uy2)
-        own = volume = xx + yy
-        liquid = own
+        volume = liquid = xx + yy
         if wet:
             liquid = g1x * (velocity[b, 2] - velocity[a, 2]) + g2x * (velocity[c, 2] - velocity[a, 2])
             liquid += g1y * (velocity[b, 3] - velocity[a, 3]) + g2y * (velocity[c, 3] - velocity[a, 3])
-        if smoothing:
-            r, s, t = index(rows[e, 0]), index(rows[e, 1]), index(rows[e, 2])
-            volume = third * (divergence[r, 0] + divergence[s, 0] + divergence[t, 0])
-            liquid = volume
-            if wet:
-                liquid += third * (divergence[r, 1] + divergence[s, 1] + divergence[t, 1])
-        skeleton = volume + held[k, E_OWN] * (own - volume)
-        correction = 0.5 * (skeleton - own)
         pressure = -(held[k, E_QS] * volume + held[k, E_QL] * liquid)
-        sxx = held[k, E_LAMBDA] * skeleton + 2.0 * held[k, E_G] * (xx + correction) - pressure
-        syy = held[k, E_LAMBDA] * skeleton + 2.0 * held[k, E_G] * (yy + correction) - pressure
+        sxx = held[k, E_LAMBDA] * volume + 2.0 * held[k, E_G] * xx - pressure
+        syy = held[k, E_LAMBDA] * volume + 2.0 * held[k, E_G] * yy - pressure
         sxy = 2.0 * held[k, E_G] * xy
-        if smoothing:
-            pressure *= held[k, E_SPREAD]
         for corner in range(3):
             if corner == 0:
                 i, gx, gy = a, -g1x - g2x, -g1y - g2y
@@ -343,23 +244,10 @@ def krylov_kernel(wet):
         parts, occupied = o.at_nodes.shape[0], ground.occupied
         flat = basis.reshape(basis.shape[0], width * basis.shape[1])
         velocity, image = basis[j], basis[j + 1]
-        if which == DIVERGENCES:
-            sum_divergences(
-                o.element_cuts[part], o.element_cuts[part + 1], occupied, o.elements, o.rows, o.geometry,
-                o.held, velocity, o.at_rows[part],
-            )  # fmt: skip
-        elif which == MEANS:
-            for r in range(o.row_cuts[part], o.row_cuts[part + 1]):
-                for phase in range(2):
-                    total = 0.0
-                    for p in range(parts):
-                        total += o.at_rows[p, r, phase]
-                        o.at_rows[p, r, phase] = 0.0
-                    o.divergence[r, phase] = total * o.per_volume[r, phase]
-        elif which == FORCES:
+        if which == FORCES:
             sum_forces(
-                o.element_cuts[part], o.element_cuts[part + 1], occupied, o.elements, o.rows, o.geometry, o.held,
-                velocity, o.smoothing, o.divergence, o.at_nodes[part],
+                o.element_cuts[part], o.element_cuts[part + 1], occupied, o.elements, o.geometry, o.held,
+                velocity, o.at_nodes[part],
             )  # fmt: skip
         elif which == ACCELERATIONS:
             accelerate_nodes(
@@ -386,8 +274,6 @@ def krylov_kernel(wet):
                         total += o.at_nodes[p, i, x]
                         o.at_nodes[p, i, x] = 0.0
                     image[i, x] = -total / o.nodal[i, x // 2] if o.free[i, x % 2] else 0.0
-                    if not o.remapping:
-                        image[i, x] = -2.0 * o.acceleration[i, x] - image[i, x]
             for k in range(j + 1):
                 o.dots[part, k] = product(flat[k], flat[j + 1], width * first, width * last)
         elif which == ORTHOGONAL:
@@ -430,9 +316,8 @@ def krylov_kernel(wet):
                 gather_part(which, part, ground, medium, operator)
                 part = next_part(meeting, stage, thread, parts)
             stage = next_stage(meeting, stage, parts)
-        first_stage = DIVERGENCES if operator.smoothing else FORCES
         for j in range(hessenberg.shape[1]):
-            for which in range(first_stage, UNIT + 1):
+            for which in range(UNIT + 1):
                 part = take_part(meeting, stage, thread, parts)
                 while part >= 0:
                     krylov_part(which, part, j, ground, operator, drag_time, basis, hessenberg)
@@ -453,31 +338,22 @@ class Spectrum:
 
     def __init__(self, solver):
         mesh, levels, parts = solver.mesh, solver.levels, solver.parts
-        n_nodes, n_rows = len(mesh.nodes), len(levels.of_row)
+        n_nodes = len(mesh.nodes)
         self.solver, self.wet = solver, solver.scene.is_two_phase
         self.shape = n_nodes, 4 if self.wet else 2
-        self.remapping = solver.scene.numerics.remapping
         self.operator = Operator(
             elements=mesh.elements,
-            rows=levels.rows,
             geometry=solver.geometry,
             stiffened=levels.stiffened,
             fixed=solver.fixed,
             step_of_node=2.0 ** levels.of_row[:n_nodes],
             undrained=solver.scene.is_undrained,
-            smoothing=solver.scene.numerics.volumetric_smoothing,
-            remapping=self.remapping,
             held=np.zeros((len(mesh.elements), ELEMENT_WIDTH)),
             nodal=np.zeros((n_nodes, 4)),
-            fill=np.zeros(n_rows),
-            per_volume=np.zeros((n_rows, 2)),
             free=np.zeros((n_nodes, 2), bool),
             element_cuts=np.zeros(parts + 1, np.int64),
-            row_cuts=np.linspace(0, n_rows, parts + 1).astype(np.int64),
             node_cuts=np.linspace(0, n_nodes, parts + 1).astype(np.int64),
             at_nodes=np.zeros((parts, n_nodes, 4)),
-            at_rows=np.zeros((parts, n_rows, 2)),
-            divergence=np.zeros((n_rows, 2)),
             acceleration=np.zeros(self.shape),
             dots=np.zeros((parts, KRYLOV + 1)),
         )
@@ -487,7 +363,7 @@ class Spectrum:
     @property
     def arrays(self):
         """All arrays that were made for it."""
-        shared = {"elements", "rows", "geometry", "stiffened", "fixed"}
+        shared = {"elements", "geometry", "stiffened", "fixed"}
         own = [value for name, value in self.operator._asdict().items() if name not in shared]
         return [self.basis, *(value for value in own if isinstance(value, np.ndarray))]
 
@@ -565,8 +441,6 @@ def spectral_time_step(spectrum, shortest, start=None):
         if not 0 < value < math.inf:
             return shortest, None
         dt = 2.0 / math.sqrt(value)
-    if not spectrum.remapping:
-        return SAFETY * dt, start
     longest = dt * 2.0 ** (solver.levels.count - 1)
     pic_share = -math.expm1(-solver.scene.numerics.pic_rate * longest)
     return SAFETY * math.sqrt(1 - 0.5 * pic_share) * dt, start

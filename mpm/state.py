@@ -56,7 +56,7 @@ def restore_solver(solver, state):
             )
     for name in ARRAYS:
         getattr(solver, name)[:] = state[name]
-    solver.means[:] = 0.0  # empty between two steps
+    solver.momenta[:] = 0.0  # empty between two steps
     solver.touched[:] = 1
     for name in NUMBERS:
         setattr(solver, name, type(getattr(solver, name))(state[name]))

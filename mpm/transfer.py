@@ -3,6 +3,7 @@
 Each kernel works on a range of the list of occupied elements and writes only to rows that these
 elements own, so ranges may run in any number of threads with the same bits. Shape functions are
 those of the linear triangle; `geometry` rows hold (g1x, g1y, g2x, g2y, x0, y0, area, height).
+Elements 4 q .. 4 q + 3 are the triangles into which both diagonals cut quadrilateral q (`mpm.mesh`).
 
 Arrays are read as `points[i, X]`, never through a row `points[i]` taken in a loop over points: numba counts the
 references of every such view, and the two calls a point cost as much as its arithmetic.
@@ -27,12 +28,15 @@ from mpm.variables import (
     B_PLY,
     B_PSX,
     B_PSY,
-    B_Q,
     C_CAVITATED,
     C_CEILING,
     C_FLOOR,
     C_SUSPENDED,
     C_TENSION,
+    E_PRESSURE,
+    E_VOLUME,
+    E_X,
+    E_Y,
     EQ,
     MASS,
     MODEL_ELASTIC,
@@ -46,7 +50,6 @@ from mpm.variables import (
     S_LAMBDA,
     S_LOOSE,
     S_MODEL,
-    S_N0,
     S_RHO_S,
     S_SIN,
     S_SIN_DIL,
@@ -59,16 +62,10 @@ from mpm.variables import (
     V_DLY,
     V_DSX,
     V_DSY,
-    V_GX,
-    V_GY,
     V_LX,
     V_LY,
-    V_P,
     V_SX,
     V_SY,
-    V_TS,
-    V_WL,
-    V_WS,
     VLX,
     VLY,
     VSX,
@@ -80,8 +77,9 @@ from mpm.variables import (
 )
 
 AHEAD = 16  # points whose rows are on the way into the cache: their order is known, the machine does not guess it
-# Share of the squared altitude: the shortest wave of the mesh loses most of its amplitude in a step, none overshoots.
-PROJECTION_SMOOTHING = 0.1
+import os
+OWN = float(os.environ.get("QOWN", "1"))
+FULL = float(os.environ.get("QFULL", "0.9"))
 
 
 @inline_kernel
@@ -93,50 +91,92 @@ def on_element(n0, n1, n2):
 
 
 @inline_kernel
-def spread_volume(volume, area, fill0, fill1, fill2):
-    """Volume of an element with what its points have too much or too little of it shared with those around [m2].
-
-    How many points an element holds is chance. Where they fill the elements around all nodes, the mean of what nodes
-    hold is the better measure: else water would flow from elements with many points to those with few, and be lost.
-    """
-    inside = min(fill0, fill1, fill2, 1.0)
-    return (1.0 - inside) * volume + inside * area * (fill0 + fill1 + fill2) / 3.0
-
-
-@inline_kernel
 def gradients(g1x, g1y, g2x, g2y, v0x, v0y, v1x, v1y, v2x, v2y):
     """Velocity gradients (xx, yy, xy, yx) of an element from those of its corners [1/s]."""
     ux1, ux2, uy1, uy2 = v1x - v0x, v2x - v0x, v1y - v0y, v2y - v0y
     return g1x * ux1 + g2x * ux2, g1y * uy1 + g2y * uy2, g1y * ux1 + g2y * ux2, g1x * uy1 + g2x * uy2
 
 
+@kernel_part
+def resolved_pressure(e, geometry, contents):
+    """What the nodes feel of the pore pressure in an element: its mean, its place and slope, and the unfelt pattern.
+
+    The forces of an element are those of the sum of v p over its points, whatever each of them has; and in a crossed
+    quadrilateral they vanish for sums that alternate in sign around its centre. Both are the null space of the map to
+    the nodes: no velocity answers to it, and what points bring along from other elements stays in it for good.
+
+    contents : (n_elements, 4) float64, of `update_points`.
+
+    Returns
+    -------
+    mean, x, y, slope_x, slope_y, share : float
+        Volume mean of the pressure without its alternating part [Pa], at (x, y) [m]; slope [Pa/m] of the quadrilateral,
+        lessened where the pressure would be negative at a corner of the element; share 0 where the quadrilateral is not
+        occupied throughout: nothing is known then, else 1.
+
+    Source: Gritton & Berzins (2017), Improving accuracy in the MPM method using a null space filter; the alternating
+    mode: Nagtegaal, Parks & Rice (1974), the constraint that follows from the three others.
+    """
+    first = e & ~index(3)
+    a, b, c, d = first, first + index(1), first + index(2), first + index(3)
+    va, vb, vc, vd = contents[a, E_VOLUME], contents[b, E_VOLUME], contents[c, E_VOLUME], contents[d, E_VOLUME]
+    if min(va, vb, vc, vd) <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    pa, pb, pc, pd = (
+        contents[a, E_PRESSURE] / va, contents[b, E_PRESSURE] / vb, contents[c, E_PRESSURE] / vc,
+        contents[d, E_PRESSURE] / vd,
+    )  # fmt: skip
+    xa, ya, xb, yb = contents[a, E_X] / va, contents[a, E_Y] / va, contents[b, E_X] / vb, contents[b, E_Y] / vb
+    xc, yc, xd, yd = contents[c, E_X] / vc, contents[c, E_Y] / vc, contents[d, E_X] / vd, contents[d, E_Y] / vd
+    ux, uy, wx, wy = xa - xc, ya - yc, xb - xd, yb - yd
+    det = ux * wy - uy * wx
+    sx = (wy * (pa - pc) - uy * (pb - pd)) / det
+    sy = (ux * (pb - pd) - wx * (pa - pc)) / det
+    # sum of the alternating pattern in v p: zero for a linear pressure
+    excess = pa - pb + pc - pd - sx * (xa - xb + xc - xd) - sy * (ya - yb + yc - yd)
+    excess /= 1.0 / va + 1.0 / vb + 1.0 / vc + 1.0 / vd
+    excess = min(max(excess, -min(vb * pb, vd * pd)), min(va * pa, vc * pc))
+    v = contents[e, E_VOLUME]
+    sign = -1.0 if e & index(1) else 1.0
+    mean, x, y = contents[e, E_PRESSURE] / v - sign * excess / v, contents[e, E_X] / v, contents[e, E_Y] / v
+    g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
+    area2 = 1.0 / (g1x * g2y - g1y * g2x)
+    p0 = sx * (geometry[e, 4] - x) + sy * (geometry[e, 5] - y)
+    p1 = p0 + (sx * g2y - sy * g2x) * area2
+    p2 = p0 + (sy * g1x - sx * g1y) * area2
+    low = -min(p0, p1, p2)
+    if low > mean:
+        sx *= mean / low
+        sy *= mean / low
+    return mean, x, y, sx, sy, 1.0
+
+
 @cache
-def advance_kernel(wet, undrained, tied, remapping):
+def advance_kernel(wet, undrained, tied):
     """Kernel `advance_points` for points with pore water or without, on levels tied to each other or on one.
 
-    `undrained`: the water has the velocity of the grains. Without `remapping` no momenta are mapped back.
+    `undrained`: the water has the velocity of the grains.
     """
     two_phase = wet and not undrained
 
     @kernel_part
     def advance_points(
         first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, rows, geometry, nodes,
-        mean, level_of_element, dt_of_level, flip_of_level, filter_of_level, touched, sums,
+        mean, contents, level_of_element, dt_of_level, flip_of_level, filter_of_level, touched, sums,
     ):  # fmt: skip
-        """Advance point velocities and positions from the nodes and, with remapping, map new momenta back (MUSL).
+        """Advance point velocities and positions from the nodes and map new momenta back (MUSL).
 
         Velocities take `flip_of_level` of the FLIP and the rest of the PIC update; positions move with
-        the solid. A pore pressure is drawn by `filter_of_level` towards its projection on continuous
-        linear functions: what such a function can represent is left as it is. Where water is missing
-        the pressure that acts, zero, is drawn just so: what wet points lose fills dry ones.
+        the solid. A pore pressure is drawn by `filter_of_level` to what the nodes feel of it (`resolved_pressure`).
+        Where water is missing the pressure that acts, zero, is drawn just so: what wet points lose fills dry ones.
 
         mean : (n_rows - n_nodes, 6) float64
             Of rows tied to a finer one: mean velocities over the steps of their node, of :mod:`mpm.contact`.
+        contents : (n_elements, 4) float64, of `update_points`.
         touched : (n_rows,) uint8
             Set for the rows of these elements.
-        sums : (n_rows, 9) float64
-            Added to its first columns, with remapping: the new momenta of both phases, or of the mixture [kg m/s per
-            metre]. `remap_nodes` reads and clears them before `element_rates` adds to the same rows.
+        sums : (n_rows, 4) float64
+            Added: the new momenta of both phases, or of the mixture [kg m/s per metre]. `remap_nodes` clears them.
 
         Source: Sulsky, Zhou & Schreyer (1995) for MUSL; Zhu & Bridson (2005) for the PIC/FLIP blend.
         """
@@ -159,6 +199,10 @@ def advance_kernel(wet, undrained, tied, remapping):
                     jx1, jy1 = mean[b - n_nodes, 0] - nodes[b, V_SX], mean[b - n_nodes, 1] - nodes[b, V_SY]
                 if c >= n_nodes:
                     jx2, jy2 = mean[c - n_nodes, 0] - nodes[c, V_SX], mean[c - n_nodes, 1] - nodes[c, V_SY]
+            pressure = px = py = slope_x = slope_y = share = 0.0
+            if wet and pressure_filter > 0.0:
+                pressure, px, py, slope_x, slope_y, share = resolved_pressure(e, geometry, contents)
+                share *= pressure_filter
             sx0 = sx1 = sx2 = sy0 = sy1 = sy2 = lx0 = lx1 = lx2 = ly0 = ly1 = ly2 = 0.0
             pic = 1.0 - flip_fraction
             for j in range(start[e], start[e + 1]):
@@ -180,8 +224,8 @@ def advance_kernel(wet, undrained, tied, remapping):
                 vy = flip_fraction * vy + pic * gy
                 if wet:
                     w = m / (soils[index(soil_of_point[i]), S_RHO_S] * (1.0 - points[i, N])) * density_liquid
-                    smooth = n0 * nodes[a, V_P] + n1 * nodes[b, V_P] + n2 * nodes[c, V_P]
-                    points[i, P] += pressure_filter * (smooth - max(points[i, P], 0.0))
+                    felt = pressure + slope_x * (points[i, X] - px) + slope_y * (points[i, Y] - py)
+                    points[i, P] += share * (felt - max(points[i, P], 0.0))
                 if undrained:
                     m += points[i, N] * w
                 if two_phase:
@@ -191,29 +235,27 @@ def advance_kernel(wet, undrained, tied, remapping):
                     uy = points[i, VLY] + n0 * nodes[a, V_DLY] + n1 * nodes[b, V_DLY] + n2 * nodes[c, V_DLY]
                     ux = flip_fraction * ux + pic * hx
                     uy = flip_fraction * uy + pic * hy
-                    if remapping:
-                        # the terms of each node in the order of its sums, so that they become vectors
-                        sx0 += n0 * (m * vx)
-                        sy0 += n0 * (m * vy)
-                        lx0 += n0 * (w * ux)
-                        ly0 += n0 * (w * uy)
-                        sx1 += n1 * (m * vx)
-                        sy1 += n1 * (m * vy)
-                        lx1 += n1 * (w * ux)
-                        ly1 += n1 * (w * uy)
-                        sx2 += n2 * (m * vx)
-                        sy2 += n2 * (m * vy)
-                        lx2 += n2 * (w * ux)
-                        ly2 += n2 * (w * uy)
+                    # the terms of each node in the order of its sums, so that they become vectors
+                    sx0 += n0 * (m * vx)
+                    sy0 += n0 * (m * vy)
+                    lx0 += n0 * (w * ux)
+                    ly0 += n0 * (w * uy)
+                    sx1 += n1 * (m * vx)
+                    sy1 += n1 * (m * vy)
+                    lx1 += n1 * (w * ux)
+                    ly1 += n1 * (w * uy)
+                    sx2 += n2 * (m * vx)
+                    sy2 += n2 * (m * vy)
+                    lx2 += n2 * (w * ux)
+                    ly2 += n2 * (w * uy)
                     points[i, VSX], points[i, VSY], points[i, VLX], points[i, VLY] = vx, vy, ux, uy
                 else:
-                    if remapping:
-                        sx0 += n0 * (m * vx)
-                        sy0 += n0 * (m * vy)
-                        sx1 += n1 * (m * vx)
-                        sy1 += n1 * (m * vy)
-                        sx2 += n2 * (m * vx)
-                        sy2 += n2 * (m * vy)
+                    sx0 += n0 * (m * vx)
+                    sy0 += n0 * (m * vy)
+                    sx1 += n1 * (m * vx)
+                    sy1 += n1 * (m * vy)
+                    sx2 += n2 * (m * vx)
+                    sy2 += n2 * (m * vy)
                     points[i, VSX], points[i, VSY] = vx, vy
                     if undrained:
                         points[i, VLX], points[i, VLY] = vx, vy
@@ -222,98 +264,89 @@ def advance_kernel(wet, undrained, tied, remapping):
                     gy += n0 * jy0 + n1 * jy1 + n2 * jy2
                 points[i, X] += dt * gx
                 points[i, Y] += dt * gy
-            if remapping:
-                sums[a, 0] += sx0
-                sums[a, 1] += sy0
-                if two_phase:
-                    sums[a, 2] += lx0
-                    sums[a, 3] += ly0
-                sums[b, 0] += sx1
-                sums[b, 1] += sy1
-                if two_phase:
-                    sums[b, 2] += lx1
-                    sums[b, 3] += ly1
-                sums[c, 0] += sx2
-                sums[c, 1] += sy2
-                if two_phase:
-                    sums[c, 2] += lx2
-                    sums[c, 3] += ly2
+            sums[a, 0] += sx0
+            sums[a, 1] += sy0
+            sums[b, 0] += sx1
+            sums[b, 1] += sy1
+            sums[c, 0] += sx2
+            sums[c, 1] += sy2
+            if two_phase:
+                sums[a, 2] += lx0
+                sums[a, 3] += ly0
+                sums[b, 2] += lx1
+                sums[b, 3] += ly1
+                sums[c, 2] += lx2
+                sums[c, 3] += ly2
 
     return advance_points
 
 
 @cache
-def rates_kernel(wet, undrained):
-    """Kernel `element_rates` for points with pore water or without, `undrained` where it moves with the grains."""
+def node_kernel(wet, undrained):
+    """Kernel `add_to_node`, what a point adds to a node, for points with pore water or without."""
+    two_phase = wet and not undrained
 
-    @kernel_part
-    def element_rates(first, last, occupied, rows, geometry, nodes, volume, fill, sums):
-        """Sum the divergences of the remapped velocities, constant in an element, at its nodes [1/s].
+    @inline_kernel
+    def add_to_node(weight, m, vx, vy, w, pore, drag, ux, uy, row, sums):
+        """Add `weight` of masses, drag and momenta of a point to a row of the nodes' sums, in place.
 
-        volume : (n_elements, 2) float64, of `update_points`.
-        fill : (n_rows,) float64
-            Volume over area of the elements with points around a row, of :func:`mpm.contact.smooth_rates`.
-        sums : (n_rows, 9) float64
-            Added: volume and volume times the divergence of the grains; volume under pore pressure, and
-            this times the divergence of the grains, as spread (`spread_volume`) times that of the water relative to
-            them, and times the gradient of the projected pore pressure; that volume as spread; area.
+        m, w, pore : float
+            Mass of its grains, of water as if it filled all, of its pore water [kg/m]; drag [kg/m/s].
         """
-        for k in range(first, last):
-            e = index(occupied[k])
-            g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
-            a, b, c = index(rows[e, 0]), index(rows[e, 1]), index(rows[e, 2])
-            xx, yy, _, _ = gradients(
-                g1x, g1y, g2x, g2y, nodes[a, V_SX], nodes[a, V_SY], nodes[b, V_SX], nodes[b, V_SY], nodes[c, V_SX],
-                nodes[c, V_SY],
-            )  # fmt: skip
-            divergence = xx + yy
-            v = volume[e, 0]
-            area = geometry[e, 6] if v > 0.0 else 0.0
-            for d in (a, b, c):
-                sums[d, 0] += v
-                sums[d, 1] += v * divergence
-                sums[d, 8] += area
-            if wet:
-                relative = 0.0
-                if not undrained:
-                    xx, yy, _, _ = gradients(
-                        g1x, g1y, g2x, g2y, nodes[a, V_LX], nodes[a, V_LY], nodes[b, V_LX], nodes[b, V_LY],
-                        nodes[c, V_LX], nodes[c, V_LY],
-                    )  # fmt: skip
-                    relative = xx + yy - divergence
-                pressed = volume[e, 1]
-                spread = pressed
-                if v > 0.0:
-                    spread *= spread_volume(v, geometry[e, 6], fill[a], fill[b], fill[c]) / v
-                p1, p2 = nodes[b, V_P] - nodes[a, V_P], nodes[c, V_P] - nodes[a, V_P]
-                px, py = pressed * (g1x * p1 + g2x * p2), pressed * (g1y * p1 + g2y * p2)
-                for d in (a, b, c):
-                    sums[d, 2] += pressed
-                    sums[d, 3] += pressed * divergence
-                    if not undrained:
-                        sums[d, 4] += spread * relative
-                    sums[d, 5] += px
-                    sums[d, 6] += py
-                    sums[d, 7] += spread
+        sums[row, B_MS] += weight * m
+        if wet:
+            sums[row, B_ML] += weight * w
+            sums[row, B_MN] += weight * pore
+        if two_phase:
+            sums[row, B_D] += weight * drag
+        moving = m + pore if undrained else m
+        sums[row, B_PSX] += weight * (moving * vx)
+        sums[row, B_PSY] += weight * (moving * vy)
+        if two_phase:
+            sums[row, B_PLX] += weight * (w * ux)
+            sums[row, B_PLY] += weight * (w * uy)
 
-    return element_rates
+    return add_to_node
 
 
 @cache
-def update_kernel(wet, undrained, plastic, smoothing, dilatant, tied):
-    """Kernel `update_points` for what the scene has: pore water, plastic or dilatant soils, smoothed volume changes.
+def force_kernel(wet):
+    """Kernel `add_forces`, what stress and pore pressure of an element push its nodes with."""
+
+    @inline_kernel
+    def add_forces(g1x, g1y, g2x, g2y, fxx, fyy, fxy, fp, a, b, c, sums):
+        """Add the forces of total stress times volume, and of pressure times volume [N m/m], to three rows, in place."""
+        g0x, g0y = -g1x - g2x, -g1y - g2y
+        sums[a, B_FX] -= g0x * fxx + g0y * fxy
+        sums[a, B_FY] -= g0x * fxy + g0y * fyy
+        sums[b, B_FX] -= g1x * fxx + g1y * fxy
+        sums[b, B_FY] -= g1x * fxy + g1y * fyy
+        sums[c, B_FX] -= g2x * fxx + g2y * fxy
+        sums[c, B_FY] -= g2x * fxy + g2y * fyy
+        if wet:
+            sums[a, B_FLX] += g0x * fp
+            sums[a, B_FLY] += g0y * fp
+            sums[b, B_FLX] += g1x * fp
+            sums[b, B_FLY] += g1y * fp
+            sums[c, B_FLX] += g2x * fp
+            sums[c, B_FLY] += g2y * fp
+
+    return add_forces
+
+
+@cache
+def update_kernel(wet, undrained, plastic, tied):
+    """Kernel `update_points` for what the scene has: pore water, plastic soils, levels.
 
     `undrained` pore water has the velocity of the grains: div v_s = div v_l, one momentum, no drag.
-
-    A dilatant soil's skeleton takes the rates of its own element. Plastic volume from shear differs between elements,
-    and so does the stress that follows; smoothed rates give no resistance to the motions that this drives, which grow.
     """
     two_phase = wet and not undrained
+    add_to_node, add_forces = node_kernel(wet, undrained), force_kernel(wet)
 
     @kernel_part
     def update_points(
         first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, bulk_liquid, rows,
-        geometry, nodes, volume, fill, level_of_element, dt_of_level, ahead, advance, wave_speed,
+        geometry, nodes, contents, level_of_element, dt_of_level, ahead, advance, wave_speed,
         element_of_point, clamps, touched, sums, left,
     ):  # fmt: skip
         """Advance stress, pore pressure and porosity of the points of a range of elements, and map them to the nodes.
@@ -329,20 +362,18 @@ def update_kernel(wet, undrained, plastic, smoothing, dilatant, tied):
 
         Parameters
         ----------
-        nodes : (n_rows, 16) float64
-            Their velocities are those of `element_rates`: strain rates are computed again, memory is dearer.
-        volume : (n_elements, 2) float64
-            Material volume, and that of points under pore pressure [m2]; read of the last and written for the
-            next step.
-        fill : (n_rows,) float64
-            Volume over area of the elements with points around a row.
+        nodes : (n_rows, 10) float64
+            Their velocities are those of `remap_nodes`.
+        contents : (n_elements, 4) float64
+            Material volume [m2], and times it pore pressure and position, summed over the points; read of the last and
+            written for the next step.
         ahead : (n_elements,) float64
             How far the stress that acts on the nodes runs ahead of that of the points, in steps of the element.
         element_of_point : (n_points,) int32
             Written: -2 - element for a point that left its element.
         touched : (n_rows,) uint8
             Set for the rows of these elements.
-        sums : (n_rows, 13) float64
+        sums : (n_rows, 12) float64
             Added: masses, momenta, drag and forces of these elements.
         left : (n_points,) int32
             Written: the points that left their element.
@@ -366,82 +397,75 @@ def update_kernel(wet, undrained, plastic, smoothing, dilatant, tied):
             g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
             x0, y0 = geometry[e, 4], geometry[e, 5]
             dt = dt_of_level[level_of_element[e]]
-            i0, i1, i2 = index(rows[e, 0]), index(rows[e, 1]), index(rows[e, 2])
-            touched[i0] = touched[i1] = touched[i2] = 1
-            ms0 = ms1 = ms2 = ml0 = ml1 = ml2 = mn0 = mn1 = mn2 = d0 = d1 = d2 = q0 = q1 = q2 = 0.0
-            sx0 = sx1 = sx2 = sy0 = sy1 = sy2 = lx0 = lx1 = lx2 = ly0 = ly1 = ly2 = 0.0
-            fxx = fxy = fyy = fp = total = pressed = fastest = 0.0
-            p0 = p1 = p2 = px = py = 0.0
+            a, b, c = index(rows[e, 0]), index(rows[e, 1]), index(rows[e, 2])
+            touched[a] = touched[b] = touched[c] = 1
+            fxx = fxy = fyy = fp = ahead_pressure = total = held_x = held_y = fastest = 0.0
             rate_xx, rate_yy, xy, yx = gradients(
-                g1x, g1y, g2x, g2y, nodes[i0, V_SX], nodes[i0, V_SY], nodes[i1, V_SX], nodes[i1, V_SY],
-                nodes[i2, V_SX], nodes[i2, V_SY],
+                g1x, g1y, g2x, g2y, nodes[a, V_SX], nodes[a, V_SY], nodes[b, V_SX], nodes[b, V_SY], nodes[c, V_SX],
+                nodes[c, V_SY],
             )  # fmt: skip
-            ts = rate_xx + rate_yy
-            own_s = dt * ts
-            if smoothing:
-                ts = third * (nodes[i0, V_TS] + nodes[i1, V_TS] + nodes[i2, V_TS])
-            if wet:
-                p0, p1, p2 = nodes[i0, V_P], nodes[i1, V_P], nodes[i2, V_P]
-                # gradient of the projected pressure, less its nodal mean: zero for a linear pressure
-                px = g1x * (p1 - p0) + g2x * (p2 - p0) - third * (nodes[i0, V_GX] + nodes[i1, V_GX] + nodes[i2, V_GX])
-                py = g1y * (p1 - p0) + g2y * (p2 - p0) - third * (nodes[i0, V_GY] + nodes[i1, V_GY] + nodes[i2, V_GY])
-                own_l = own_s
-                if two_phase:
-                    liquid_xx, liquid_yy, _, _ = gradients(
-                        g1x, g1y, g2x, g2y, nodes[i0, V_LX], nodes[i0, V_LY], nodes[i1, V_LX], nodes[i1, V_LY],
-                        nodes[i2, V_LX], nodes[i2, V_LY],
-                    )  # fmt: skip
-                    own_l = dt * (liquid_xx + liquid_yy)
-                wet_s, wet_l = own_s, own_l
-                if smoothing and volume[e, 1] > 0.0:
-                    wet_s = wet_l = dt * third * (nodes[i0, V_WS] + nodes[i1, V_WS] + nodes[i2, V_WS])
-                if smoothing and two_phase and volume[e, 1] > 0.0:
-                    wet_l = dt * third * (nodes[i0, V_WL] + nodes[i1, V_WL] + nodes[i2, V_WL])
-            correction = 0.5 * (ts - (rate_xx + rate_yy))
-            exx = dt * (rate_xx + correction)
-            eyy = dt * (rate_yy + correction)
-            exy = 0.5 * dt * (xy + yx)
-            spin = 0.5 * dt * (yx - xy)
-            ts *= dt
-            mean = ts * third
+            exx, eyy, exy, spin = dt * rate_xx, dt * rate_yy, 0.5 * dt * (xy + yx), 0.5 * dt * (yx - xy)
+            expansion = exx + eyy
+            expansion_liquid = expansion
+            if two_phase:
+                liquid_xx, liquid_yy, _, _ = gradients(
+                    g1x, g1y, g2x, g2y, nodes[a, V_LX], nodes[a, V_LY], nodes[b, V_LX], nodes[b, V_LY], nodes[c, V_LX],
+                    nodes[c, V_LY],
+                )  # fmt: skip
+                expansion_liquid = dt * (liquid_xx + liquid_yy)
+            if OWN < 1.0:
+                q = e & ~index(3)
+                held = contents[q, E_VOLUME] + contents[q + index(1), E_VOLUME]
+                held += contents[q + index(2), E_VOLUME] + contents[q + index(3), E_VOLUME]
+                room = geometry[q, 6] + geometry[q + index(1), 6] + geometry[q + index(2), 6] + geometry[q + index(3), 6]
+                if held >= FULL * room:
+                    qa, qb, qc, qd = index(rows[q, 0]), index(rows[q + index(1), 0]), index(rows[q + index(2), 0]), index(rows[q + index(3), 0])
+                    xac, yac = geometry[q, 4] - geometry[q + index(2), 4], geometry[q, 5] - geometry[q + index(2), 5]
+                    xbd, ybd = geometry[q + index(1), 4] - geometry[q + index(3), 4], geometry[q + index(1), 5] - geometry[q + index(3), 5]
+                    factor = dt * (1.0 - OWN) / (xac * ybd - xbd * yac)
+                    mean = factor * (
+                        (nodes[qa, V_SX] - nodes[qc, V_SX]) * ybd - (nodes[qb, V_SX] - nodes[qd, V_SX]) * yac
+                        - (nodes[qa, V_SY] - nodes[qc, V_SY]) * xbd + (nodes[qb, V_SY] - nodes[qd, V_SY]) * xac
+                    )
+                    correction = 0.5 * (mean - (1.0 - OWN) * expansion)
+                    exx += correction
+                    eyy += correction
+                    expansion = exx + eyy
+                    if two_phase:
+                        mean = factor * (
+                            (nodes[qa, V_LX] - nodes[qc, V_LX]) * ybd - (nodes[qb, V_LX] - nodes[qd, V_LX]) * yac
+                            - (nodes[qa, V_LY] - nodes[qc, V_LY]) * xbd + (nodes[qb, V_LY] - nodes[qd, V_LY]) * xac
+                        )
+                        expansion_liquid = OWN * expansion_liquid + mean
+                    else:
+                        expansion_liquid = expansion
+            mean = expansion * third
             equivalent = np.sqrt(2.0 * third * ((exx - mean) ** 2 + (eyy - mean) ** 2 + mean * mean + 2.0 * exy * exy))
-            full = volume[e, 0] >= geometry[e, 6]
+            full = contents[e, E_VOLUME] >= geometry[e, 6]
             border = tied and ahead[e] > 0.0
             cxx = cyy = cxy = cp = 0.0
             for j in range(start[e], start[e + 1]):
                 i = index(order[j])
                 prefetch(points, index(order[min(j + AHEAD, order.size - 1)]))
                 s = index(soil_of_point[i])
-                dxx, dyy, dvol = exx, eyy, ts
-                if dilatant and soils[s, S_SIN_DIL] > 0.0:
-                    dxx, dyy, dvol = dt * rate_xx, dt * rate_yy, own_s
                 if border:
                     before = max(points[i, P], 0.0) if wet else 0.0
                     cxx, cyy, cxy, cp = points[i, SXX] - before, points[i, SYY] - before, points[i, SXY], before
                 if advance:
                     n = points[i, N]
                     p = points[i, P]
-                    loose = n >= soils[s, S_LOOSE]
                     points[i, EQ] += equivalent
-                    es = own_s
-                    if wet and p > 0.0:
-                        es = wet_s
-                    if loose and p <= 0.0 and (own_s > 0.0 or not full):
+                    if n >= soils[s, S_LOOSE] and p <= 0.0 and (expansion > 0.0 or not full):
                         # lumps with air between them: shape changes, neither grains nor water are stretched or squeezed
                         points[i, SXX] = points[i, SYY] = points[i, SZZ] = points[i, SXY] = 0.0
                         n_suspended += 1
                     else:
                         if wet:
-                            # missing water constrains nothing, so nothing locks: it is remembered by the element's
-                            # own rates, which are what moves its points
-                            el = wet_l if p > 0.0 else own_l
-                            p -= bulk_liquid / n * ((1.0 - n) * es + n * el)
+                            p -= bulk_liquid / n * ((1.0 - n) * expansion + n * expansion_liquid)
                             points[i, P] = p
                             if p < 0.0:
                                 n_cavitated += 1
-                        # looser than in the ground, grains close up by what moves them; else with the skeleton's strain
-                        change = es if n > soils[s, S_N0] else dvol
-                        n = 1.0 - (1.0 - n) / (1.0 + change)
+                        n = 1.0 - (1.0 - n) / (1.0 + expansion)
                         if n < POROSITY_FLOOR:
                             n = POROSITY_FLOOR
                             n_floor += 1
@@ -456,10 +480,10 @@ def update_kernel(wet, undrained, plastic, smoothing, dilatant, tied):
                             lam, shear = soils[s, S_LAMBDA], soils[s, S_G]
                             sxx, syy, sxy = points[i, SXX], points[i, SYY], points[i, SXY]
                             turn = 2.0 * spin * sxy
-                            txx = sxx - turn + lam * dvol + 2.0 * shear * dxx
-                            tyy = syy + turn + lam * dvol + 2.0 * shear * dyy
+                            txx = sxx - turn + lam * expansion + 2.0 * shear * exx
+                            tyy = syy + turn + lam * expansion + 2.0 * shear * eyy
                             txy = sxy + spin * (sxx - syy) + 2.0 * shear * exy
-                            tzz = points[i, SZZ] + lam * dvol
+                            tzz = points[i, SZZ] + lam * expansion
                             if plastic and soils[s, S_MODEL] != MODEL_ELASTIC:
                                 txx, tyy, tzz, txy, cut = mohr_coulomb(
                                     txx, tyy, tzz, txy, shear, soils[s, S_K], soils[s, S_C_COS], soils[s, S_SIN],
@@ -472,173 +496,53 @@ def update_kernel(wet, undrained, plastic, smoothing, dilatant, tied):
                     checked += points[i, VSX] + points[i, VSY] + points[i, VLX] + points[i, VLY]
                     if bad < 0 and not np.isfinite(checked):
                         bad = np.int64(i)
-                dx = points[i, X] - x0
-                dy = points[i, Y] - y0
-                n1 = g1x * dx + g1y * dy
-                n2 = g2x * dx + g2y * dy
+                x, y = points[i, X], points[i, Y]
+                n1 = g1x * (x - x0) + g1y * (y - y0)
+                n2 = g2x * (x - x0) + g2y * (y - y0)
                 if n1 < 0.0 or n2 < 0.0 or n1 + n2 > 1.0:
                     element_of_point[i] = -2 - np.int64(e)  # to be searched from e
                     left[moved] = i
                     moved += 1
                     continue
-                n0 = 1.0 - n1 - n2
                 m, n = points[i, MASS], points[i, N]
                 v = m / (soils[s, S_RHO_S] * (1.0 - n))
                 vx, vy = points[i, VSX], points[i, VSY]
                 fastest = max(fastest, vx * vx + vy * vy)
-                p = 0.0
+                p = w = pore = drag = ux = uy = 0.0
                 if wet:
                     p = max(points[i, P], 0.0)
-                    pressed += v if p > 0.0 else 0.0
-                    excess = v * (p - (n0 * p0 + n1 * p1 + n2 * p2))
-                    fp += v * p
                     w = v * density_liquid
                     pore = n * w
-                if undrained:
-                    ms0 += n0 * m
-                    ml0 += n0 * w
-                    mn0 += n0 * pore
-                    q0 += n0 * excess
-                    ms1 += n1 * m
-                    ml1 += n1 * w
-                    mn1 += n1 * pore
-                    q1 += n1 * excess
-                    ms2 += n2 * m
-                    ml2 += n2 * w
-                    mn2 += n2 * pore
-                    q2 += n2 * excess
-                    m += pore
-                    sx0 += n0 * (m * vx)
-                    sy0 += n0 * (m * vy)
-                    sx1 += n1 * (m * vx)
-                    sy1 += n1 * (m * vy)
-                    sx2 += n2 * (m * vx)
-                    sy2 += n2 * (m * vy)
-                elif wet:
+                    fp += v * p
+                    held_x += v * x
+                    held_y += v * y
+                if two_phase:
                     drag = pore * soils[s, S_DRAG]
                     ux, uy = points[i, VLX], points[i, VLY]
                     fastest = max(fastest, ux * ux + uy * uy)
-                    # the terms of each node in the order of its sums, so that they become vectors
-                    ms0 += n0 * m
-                    ml0 += n0 * w
-                    mn0 += n0 * pore
-                    d0 += n0 * drag
-                    sx0 += n0 * (m * vx)
-                    sy0 += n0 * (m * vy)
-                    lx0 += n0 * (w * ux)
-                    ly0 += n0 * (w * uy)
-                    q0 += n0 * excess
-                    ms1 += n1 * m
-                    ml1 += n1 * w
-                    mn1 += n1 * pore
-                    d1 += n1 * drag
-                    sx1 += n1 * (m * vx)
-                    sy1 += n1 * (m * vy)
-                    lx1 += n1 * (w * ux)
-                    ly1 += n1 * (w * uy)
-                    q1 += n1 * excess
-                    ms2 += n2 * m
-                    ml2 += n2 * w
-                    mn2 += n2 * pore
-                    d2 += n2 * drag
-                    sx2 += n2 * (m * vx)
-                    sy2 += n2 * (m * vy)
-                    lx2 += n2 * (w * ux)
-                    ly2 += n2 * (w * uy)
-                    q2 += n2 * excess
-                else:
-                    ms0 += n0 * m
-                    sx0 += n0 * (m * vx)
-                    sy0 += n0 * (m * vy)
-                    ms1 += n1 * m
-                    sx1 += n1 * (m * vx)
-                    sy1 += n1 * (m * vy)
-                    ms2 += n2 * m
-                    sx2 += n2 * (m * vx)
-                    sy2 += n2 * (m * vy)
+                add_to_node(1.0 - n1 - n2, m, vx, vy, w, pore, drag, ux, uy, a, sums)
+                add_to_node(n1, m, vx, vy, w, pore, drag, ux, uy, b, sums)
+                add_to_node(n2, m, vx, vy, w, pore, drag, ux, uy, c, sums)
                 fxx += v * (points[i, SXX] - p)
                 fyy += v * (points[i, SYY] - p)
                 fxy += v * points[i, SXY]
                 total += v
                 if border:
-                    w = ahead[e] * v
-                    fxx += w * (points[i, SXX] - p - cxx)
-                    fyy += w * (points[i, SYY] - p - cyy)
-                    fxy += w * (points[i, SXY] - cxy)
+                    more = ahead[e] * v
+                    fxx += more * (points[i, SXX] - p - cxx)
+                    fyy += more * (points[i, SYY] - p - cyy)
+                    fxy += more * (points[i, SXY] - cxy)
                     if wet:
-                        fp += w * (p - cp)
-            volume[e, 0] = total
-            volume[e, 1] = pressed
+                        ahead_pressure += more * (p - cp)
+            contents[e, E_VOLUME] = total
+            if wet:
+                contents[e, E_PRESSURE], contents[e, E_X], contents[e, E_Y] = fp, held_x, held_y
             fastest = np.sqrt(fastest)
             local = geometry[e, 7] / ((wave_speed + fastest) * (1 << level_of_element[e]))
             if local < limit:
                 limit = local
                 limit_speed = fastest
-            g0x, g0y = -g1x - g2x, -g1y - g2y
-            if wet:
-                if smoothing and total > 0.0:
-                    fp *= spread_volume(total, geometry[e, 6], fill[i0], fill[i1], fill[i2]) / total
-                # the smallest of the element's nodal shares of volume: a node that hardly touches it is not overdrawn
-                share = 3.0 * min(ml0, ml1, ml2) / (density_liquid * total) if total > 0.0 else 0.0
-                damped = PROJECTION_SMOOTHING * geometry[e, 7] ** 2 * share * pressed
-                sums[i0, B_MS] += ms0
-                sums[i0, B_ML] += ml0
-                sums[i0, B_MN] += mn0
-                if two_phase:
-                    sums[i0, B_D] += d0
-                    sums[i0, B_PLX] += lx0
-                    sums[i0, B_PLY] += ly0
-                sums[i0, B_PSX] += sx0
-                sums[i0, B_PSY] += sy0
-                sums[i0, B_Q] += q0 - damped * (g0x * px + g0y * py)
-                sums[i0, B_FX] -= g0x * fxx + g0y * fxy
-                sums[i0, B_FY] -= g0x * fxy + g0y * fyy
-                sums[i0, B_FLX] += g0x * fp
-                sums[i0, B_FLY] += g0y * fp
-                sums[i1, B_MS] += ms1
-                sums[i1, B_ML] += ml1
-                sums[i1, B_MN] += mn1
-                if two_phase:
-                    sums[i1, B_D] += d1
-                    sums[i1, B_PLX] += lx1
-                    sums[i1, B_PLY] += ly1
-                sums[i1, B_PSX] += sx1
-                sums[i1, B_PSY] += sy1
-                sums[i1, B_Q] += q1 - damped * (g1x * px + g1y * py)
-                sums[i1, B_FX] -= g1x * fxx + g1y * fxy
-                sums[i1, B_FY] -= g1x * fxy + g1y * fyy
-                sums[i1, B_FLX] += g1x * fp
-                sums[i1, B_FLY] += g1y * fp
-                sums[i2, B_MS] += ms2
-                sums[i2, B_ML] += ml2
-                sums[i2, B_MN] += mn2
-                if two_phase:
-                    sums[i2, B_D] += d2
-                    sums[i2, B_PLX] += lx2
-                    sums[i2, B_PLY] += ly2
-                sums[i2, B_PSX] += sx2
-                sums[i2, B_PSY] += sy2
-                sums[i2, B_Q] += q2 - damped * (g2x * px + g2y * py)
-                sums[i2, B_FX] -= g2x * fxx + g2y * fxy
-                sums[i2, B_FY] -= g2x * fxy + g2y * fyy
-                sums[i2, B_FLX] += g2x * fp
-                sums[i2, B_FLY] += g2y * fp
-            else:
-                sums[i0, B_MS] += ms0
-                sums[i0, B_PSX] += sx0
-                sums[i0, B_PSY] += sy0
-                sums[i0, B_FX] -= g0x * fxx + g0y * fxy
-                sums[i0, B_FY] -= g0x * fxy + g0y * fyy
-                sums[i1, B_MS] += ms1
-                sums[i1, B_PSX] += sx1
-                sums[i1, B_PSY] += sy1
-                sums[i1, B_FX] -= g1x * fxx + g1y * fxy
-                sums[i1, B_FY] -= g1x * fxy + g1y * fyy
-                sums[i2, B_MS] += ms2
-                sums[i2, B_PSX] += sx2
-                sums[i2, B_PSY] += sy2
-                sums[i2, B_FX] -= g2x * fxx + g2y * fxy
-                sums[i2, B_FY] -= g2x * fxy + g2y * fyy
+            add_forces(g1x, g1y, g2x, g2y, fxx, fyy, fxy, fp + ahead_pressure, a, b, c, sums)
         clamps[C_SUSPENDED] += n_suspended
         clamps[C_CAVITATED] += n_cavitated
         clamps[C_FLOOR] += n_floor
@@ -652,9 +556,10 @@ def update_kernel(wet, undrained, plastic, smoothing, dilatant, tied):
 @cache
 def map_kernel(wet, undrained, tied):
     """Kernel `map_point` for points with pore water or without; with levels a point may wait outside its element."""
+    add_to_node, add_forces = node_kernel(wet, undrained), force_kernel(wet)
 
     @kernel_part
-    def map_point(row, soil, density_liquid, corner, geometry, nodes, touched, sums):
+    def map_point(row, soil, density_liquid, corner, geometry, touched, sums):
         """Add one point to the rows of the element that holds it, as `update_points` does for those that stay.
 
         row, soil, corner, geometry : one row of points, soils, elements and geometry.
@@ -669,38 +574,26 @@ def map_kernel(wet, undrained, tied):
             n0, n1, n2 = on_element(n0, n1, n2)
         m, n = row[MASS], row[N]
         v = m / (soil[S_RHO_S] * (1.0 - n))
-        p = max(row[P], 0.0) if wet else 0.0
-        fxx, fyy, fxy = v * (row[SXX] - p), v * (row[SYY] - p), v * row[SXY]
-        fastest = row[VSX] ** 2 + row[VSY] ** 2
+        vx, vy = row[VSX], row[VSY]
+        fastest = vx * vx + vy * vy
+        p = w = pore = drag = ux = uy = 0.0
         if wet:
-            fastest = max(fastest, row[VLX] ** 2 + row[VLY] ** 2)
-            excess = p - n0 * nodes[corner[0], V_P] - n1 * nodes[corner[1], V_P] - n2 * nodes[corner[2], V_P]
-        for k in range(3):
-            if k == 0:
-                weight, gx, gy = n0, -geometry[0] - geometry[2], -geometry[1] - geometry[3]
-            elif k == 1:
-                weight, gx, gy = n1, geometry[0], geometry[1]
-            else:
-                weight, gx, gy = n2, geometry[2], geometry[3]
-            touched[corner[k]] = 1
-            b = sums[corner[k]]
-            b[B_MS] += weight * m
-            moving = weight * (m + n * v * density_liquid) if undrained else weight * m
-            b[B_PSX] += moving * row[VSX]
-            b[B_PSY] += moving * row[VSY]
-            b[B_FX] -= gx * fxx + gy * fxy
-            b[B_FY] -= gx * fxy + gy * fyy
-            if wet:
-                w = weight * v * density_liquid
-                b[B_ML] += w
-                b[B_MN] += n * w
-                b[B_Q] += weight * v * excess
-                if not undrained:
-                    b[B_D] += n * soil[S_DRAG] * w
-                    b[B_PLX] += w * row[VLX]
-                    b[B_PLY] += w * row[VLY]
-                b[B_FLX] += gx * v * p
-                b[B_FLY] += gy * v * p
+            p = max(row[P], 0.0)
+            w = v * density_liquid
+            pore = n * w
+        if wet and not undrained:
+            drag = pore * soil[S_DRAG]
+            ux, uy = row[VLX], row[VLY]
+            fastest = max(fastest, ux * ux + uy * uy)
+        a, b, c = index(corner[0]), index(corner[1]), index(corner[2])
+        touched[a] = touched[b] = touched[c] = 1
+        add_to_node(n0, m, vx, vy, w, pore, drag, ux, uy, a, sums)
+        add_to_node(n1, m, vx, vy, w, pore, drag, ux, uy, b, sums)
+        add_to_node(n2, m, vx, vy, w, pore, drag, ux, uy, c, sums)
+        add_forces(
+            geometry[0], geometry[1], geometry[2], geometry[3], v * (row[SXX] - p), v * (row[SYY] - p), v * row[SXY],
+            v * p, a, b, c, sums,
+        )  # fmt: skip
         return fastest
 
     return map_point

@@ -29,15 +29,17 @@ POINT_VARIABLES = (
 POINT_WIDTH = len(POINT_VARIABLES)
 
 # Element-to-node buffer: what an element adds to one of its nodes.
-(B_MS, B_ML, B_MN, B_D, B_PSX, B_PSY, B_PLX, B_PLY, B_Q, B_FX, B_FY, B_FLX, B_FLY) = range(13)
-BUFFER_WIDTH = 13
+(B_MS, B_ML, B_MN, B_D, B_PSX, B_PSY, B_PLX, B_PLY, B_FX, B_FY, B_FLX, B_FLY) = range(12)
+BUFFER_WIDTH = 12
 
-# Node row: end-of-step velocities, their increments, masses, the pressure projection, smoothed rates,
-# the mean gradient of the pressure projection.
-(V_MS, V_ML, V_SX, V_SY, V_LX, V_LY, V_DSX, V_DSY, V_DLX, V_DLY, V_P, V_TS, V_WS, V_WL, V_GX, V_GY) = range(16)
-NODE_WIDTH = 16
-NODAL_MEANS = 9  # what `element_rates` sums at a node
-NODAL_MOMENTA = 4  # what `advance_points` sums at a node before, in the first of the same columns
+# Node row: end-of-step velocities, their increments, masses.
+(V_SX, V_SY, V_LX, V_LY, V_DSX, V_DSY, V_DLX, V_DLY, V_MS, V_ML) = range(10)
+NODE_WIDTH = 10
+NODAL_MOMENTA = 4  # what `advance_points` sums at a node
+
+# Element row: volume of its points, and times it their pore pressure and position.
+(E_VOLUME, E_PRESSURE, E_X, E_Y) = range(4)
+ELEMENT_CONTENTS = 4
 
 # Soil parameters, one row a soil.
 (

@@ -5,7 +5,7 @@ import pytest
 from small_event import small_scene
 
 import mpm
-from mpm.long_step import ADVANCE, FOLLOW, PLAN, RATES, REMAP, SOLVE
+from mpm.long_step import ADVANCE, FOLLOW, PLAN, REMAP, SOLVE, UPDATE
 from mpm.variables import MASS, S_RHO_S, V_DLX, V_DLY, V_DSX, V_DSY, VLX, VLY, N, X, Y
 
 
@@ -19,7 +19,7 @@ class Audited(mpm.Solver):
         self._account()
         self._run(ADVANCE, REMAP)
         before = self._pore_water()
-        self._run(RATES, FOLLOW)
+        self._run(UPDATE, FOLLOW)
         speed2 = self.points[:, VLX] ** 2 + self.points[:, VLY] ** 2
         self.uptake += 0.5 * float(np.sum((self._pore_water() - before) * speed2))
 

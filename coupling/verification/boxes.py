@@ -7,8 +7,33 @@ import numpy as np
 SOIL, EMPTY = 0, 3
 
 
+def crossed(nodes, quadrilaterals):
+    """Cut quadrilaterals by both diagonals into four triangles each, about a node where these meet.
+
+    Parameters
+    ----------
+    nodes : (n, 2) float64
+    quadrilaterals : (m, 4) int
+        Corners, counter-clockwise.
+
+    Returns
+    -------
+    nodes : (n + m, 2) float64
+    elements : (4 m, 3) int32
+        4 q + k is (corner k, corner k + 1, centre) of quadrilateral q.
+    """
+    a, b, c, d = (nodes[quadrilaterals[:, k]] for k in range(4))
+    along, across, gap = c - a, d - b, b - a
+    share = (gap[:, 0] * across[:, 1] - gap[:, 1] * across[:, 0]) / (
+        along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]
+    )
+    centre = np.broadcast_to(len(nodes) + np.arange(len(a))[:, None], (len(a), 4))
+    elements = np.stack([quadrilaterals, np.roll(quadrilaterals, -1, axis=1), centre], axis=2)
+    return np.concatenate([nodes, a + share[:, None] * along]), elements.reshape(-1, 3).astype(np.int32)
+
+
 def box_mesh(x, y, filled=None, fixed_bottom=True):
-    """Crossed triangles on a rectangular grid, with the fields that :class:`mpm.Solver` reads of a mesh.
+    """Rectangles of a grid, each cut by both diagonals, with the fields that :class:`mpm.Solver` reads of a mesh.
 
     Parameters
     ----------
@@ -30,15 +55,11 @@ def box_mesh(x, y, filled=None, fixed_bottom=True):
     nodes = np.column_stack([gx.ravel(), gy.ravel()])
     j, i = np.divmod(np.arange(columns * rows), columns)
     a = j * (columns + 1) + i
-    b, c, d = a + 1, a + columns + 1, a + columns + 2
-    odd = ((i + j) % 2).astype(bool)
-    first = np.where(odd[:, None], np.column_stack([a, b, d]), np.column_stack([a, b, c]))
-    second = np.where(odd[:, None], np.column_stack([a, d, c]), np.column_stack([b, d, c]))
-    elements = np.stack([first, second], axis=1).reshape(-1, 3).astype(np.int32)
+    nodes, elements = crossed(nodes, np.column_stack([a, a + 1, a + columns + 2, a + columns + 1]))
     cx, cy = nodes[elements].mean(axis=1).T
     inside = cy < 0 if filled is None else np.asarray(filled(cx, cy), bool)
     none = np.zeros(0, np.int32)
-    number = np.arange(len(nodes)).reshape(rows + 1, columns + 1)
+    number = np.arange((rows + 1) * (columns + 1)).reshape(rows + 1, columns + 1)
     return SimpleNamespace(
         nodes=nodes, elements=elements, region=np.where(inside, SOIL, EMPTY).astype(np.int8),
         outer_nodes=(), outer_theta=(), opening_nodes=none, corner_nodes=none, wall_nodes=none, wall_side=none,
@@ -48,7 +69,7 @@ def box_mesh(x, y, filled=None, fixed_bottom=True):
 
 
 def annulus_mesh(radii, sectors):
-    """Crossed triangles on a quarter annulus about the origin, y downward from 0, all filled; smooth on its two axes.
+    """Crossed quadrilaterals on a quarter annulus about the origin, y downward from 0, all filled; smooth on its two axes.
 
     Parameters
     ----------
@@ -62,13 +83,16 @@ def annulus_mesh(radii, sectors):
         hold `on_axis` (y = 0) vertically.
     """
     radii = np.asarray(radii, float)
-    mesh = box_mesh(np.linspace(0, 1, sectors + 1), np.arange(len(radii)) - len(radii) - 1.0, fixed_bottom=False)
-    angle = np.pi / 2 * mesh.nodes[:, 0]
-    ring = np.round(mesh.nodes[:, 1] - mesh.nodes[0, 1]).astype(int)
-    mesh.nodes = np.column_stack([radii[ring] * np.sin(angle), -radii[ring] * np.cos(angle)])
-    mesh.nodes[np.abs(mesh.nodes) < 1e-12 * radii[-1]] = 0.0
-    mesh.elements = np.ascontiguousarray(mesh.elements[:, ::-1])  # the map turns the sense of the corners
+    rings = len(radii)
+    mesh = box_mesh(np.linspace(0, 1, sectors + 1), np.arange(rings) - rings - 1.0, fixed_bottom=False)
+    corners = mesh.nodes[: rings * (sectors + 1)]
+    angle = np.pi / 2 * corners[:, 0]
+    ring = np.round(corners[:, 1] - corners[0, 1]).astype(int)
+    corners = np.column_stack([radii[ring] * np.sin(angle), -radii[ring] * np.cos(angle)])
+    corners[np.abs(corners) < 1e-12 * radii[-1]] = 0.0
+    # the map turns the sense of the corners
+    mesh.nodes, mesh.elements = crossed(corners, mesh.elements[:, 0].reshape(-1, 4)[:, ::-1])
     mesh.inner = np.flatnonzero(ring == 0)
-    mesh.outer = np.flatnonzero(ring == len(radii) - 1)
+    mesh.outer = np.flatnonzero(ring == rings - 1)
     mesh.on_axis, mesh.right, mesh.top = mesh.right, mesh.right[:0], mesh.right[:0]
     return mesh

@@ -49,7 +49,7 @@ def column(
 
 def terzaghi(
     cells=20, conductivity=1e-4, bulk_modulus=8e7, time_factor=0.1, model="elastic", points=3, courant=0.8,
-    pic_rate=10.0, smoothing=True, remapping=True, pressure_filter=0.4, inertia=False, drainage="two-phase",
+    pic_rate=10.0, pressure_filter=0.4, inertia=False, drainage="two-phase",
 ):  # fmt: skip
     """Let an excess pressure, carried by the water of a column of 1 m, drain through its top until Tv = `time_factor`.
 
@@ -59,8 +59,7 @@ def terzaghi(
     """
     height, initial = 1.0, 1e4
     scene, mesh = column(
-        cells, height, conductivity, bulk_modulus, model=model, points=points, courant=courant, pic_rate=pic_rate,
-        volumetric_smoothing=smoothing, remapping=remapping, pressure_filter=pressure_filter, drainage=drainage,
+        cells, height, conductivity, bulk_modulus, model=model, points=points, courant=courant, pic_rate=pic_rate, pressure_filter=pressure_filter, drainage=drainage,
     )  # fmt: skip
     solver = Solver(scene, mesh, threads=1)
     hydrostatic = solver.points[:, P].copy()
@@ -69,7 +68,6 @@ def terzaghi(
     solver.points[:, SXX] += NU / (1 - NU) * initial
     solver.points[:, SZZ] += NU / (1 - NU) * initial
     still = np.maximum(-mesh.nodes[:, 1], 0.0) * 1000.0 * 9.81
-    solver.set_projected_pressure(still + initial * (mesh.nodes[:, 1] < 1e-9))
     storage = 1 / constrained_modulus() + POROSITY / bulk_modulus
     end = time_factor * height**2 * 1000 * 9.81 * storage / conductivity
     longest = 0.0
@@ -90,7 +88,7 @@ def terzaghi(
     )  # fmt: skip
 
 
-def oedometer(cells=5, strain=1e-3, duration=0.5, points=3, courant=0.8, pic_rate=10.0, smoothing=True, remapping=True):
+def oedometer(cells=5, strain=1e-3, duration=0.5, points=3, courant=0.8, pic_rate=10.0):
     """Press the top of a dry elastic column of 1 m down by `strain`, slowly: stresses of its points.
 
     Reference: Hooke's law without lateral strain, sigma_yy = M e, sigma_xx = nu/(1-nu) sigma_yy, with the logarithmic
@@ -99,7 +97,7 @@ def oedometer(cells=5, strain=1e-3, duration=0.5, points=3, courant=0.8, pic_rat
     size = 1.0 / cells
     scene = dry_scene(
         "oedometer", size, 2 * size, 1.0, {"model": "elastic", "poissons_ratio": NU}, gravity=1e-9, points=points,
-        courant=courant, pic_rate=pic_rate, volumetric_smoothing=smoothing, remapping=remapping,
+        courant=courant, pic_rate=pic_rate,
     )  # fmt: skip
     solver = DrivenSolver(scene, box_mesh([-size, 0.0, size], np.linspace(-1, 0, cells + 1)), damping=0.5)
     solver.points[:, [SXX, SYY, SZZ]] = 0.0
@@ -121,7 +119,7 @@ def oedometer(cells=5, strain=1e-3, duration=0.5, points=3, courant=0.8, pic_rat
 
 
 def hydrostatics(
-    size=0.35, size_growth=0.3, duration=0.05, points=3, courant=0.8, pic_rate=10.0, smoothing=True, remapping=True,
+    size=0.35, size_growth=0.3, duration=0.05, points=3, courant=0.8, pic_rate=10.0,
     pressure_filter=0.4, local_time_stepping=True, lining="fixed",
 ):  # fmt: skip
     """Ground under K0 and hydrostatic stress around a lining without a gate, left to itself for `duration` [s].
@@ -145,7 +143,7 @@ def hydrostatics(
             "element_size": 3.0, "element_size_lining": size, "size_growth": size_growth, "points_per_element": points,
         },
         numerics={
-            "courant": courant, "pic_rate": pic_rate, "volumetric_smoothing": smoothing, "remapping": remapping,
+            "courant": courant, "pic_rate": pic_rate,
             "pressure_filter": pressure_filter, "local_time_stepping": local_time_stepping,
         },
     ).mpm  # fmt: skip
@@ -184,8 +182,7 @@ def hydrostatics(
 
 DRAINAGE = ("two-phase", "undrained")
 NUMERICS = {
-    "points": (1, 3, 12), "courant": (0.2, 0.4, 0.8, 1.0), "pic_rate": (0.0, 10.0, 100.0), "smoothing": (False, True),
-    "remapping": (False, True),
+    "points": (1, 3, 12), "courant": (0.2, 0.4, 0.8, 1.0), "pic_rate": (0.0, 10.0, 100.0),
 }  # fmt: skip
 
 register(Problem(

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mpm.contact import FIXED_X, FIXED_Y
-from mpm.long_step import ADVANCE, FOLLOW, PLAN, RATES, REMAP, SOLVE
+from mpm.long_step import ADVANCE, FOLLOW, PLAN, REMAP, SOLVE, UPDATE
 from mpm.scene import Scene
 from mpm.solver import Solver
 from mpm.variables import V_DLX, V_DLY, V_DSX, V_DSY, V_LX, V_LY, V_MS, V_SX, V_SY
@@ -46,7 +46,7 @@ class DrivenSolver(Solver):
         moved = self.driven & (self.nodes[:, V_MS] > 0)[:, None]
         self.nodes[:, V_SX : V_SY + 1][moved] = self.velocity[moved]
         self.nodes[:, V_LX : V_LY + 1][self.driven_liquid] = self.velocity_liquid[self.driven_liquid]
-        self._run(RATES, FOLLOW)
+        self._run(UPDATE, FOLLOW)
 
     def _drive(self, dt):
         row = self.nodes

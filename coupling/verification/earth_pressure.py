@@ -33,7 +33,7 @@ def load_path(solver, duration, nodes, component, speed):
 
 def wall(
     direction, cells, width, strain, friction_angle, dilatancy_angle, cohesion, rough_base, duration, points, courant,
-    pic_rate, smoothing, remapping,
+    pic_rate,
 ):  # fmt: skip
     """Move a smooth wall of 1 m height away from (-1) or into (1) the soil.
 
@@ -48,7 +48,6 @@ def wall(
     }  # fmt: skip
     scene = dry_scene(
         "wall", size, columns * size, 1.0, soil, points=points, courant=courant, pic_rate=pic_rate,
-        volumetric_smoothing=smoothing, remapping=remapping,
     )  # fmt: skip
     solver = DrivenSolver(scene, mesh, damping=DAMPING)
     bottom = np.abs(mesh.nodes[:, 1] + 1.0) < 1e-9
@@ -67,23 +66,23 @@ def wall(
 
 def active_wall(
     cells=10, width=2.0, strain=4e-4, friction_angle=30.0, dilatancy_angle=0.0, cohesion=0.0, rough_base=False,
-    duration=0.5, points=3, courant=0.8, pic_rate=10.0, smoothing=True, remapping=True,
+    duration=0.5, points=3, courant=0.8, pic_rate=10.0,
 ):  # fmt: skip
     """Active thrust."""
     return wall(
         -1, cells, width, strain, friction_angle, dilatancy_angle, cohesion, rough_base, duration, points, courant,
-        pic_rate, smoothing, remapping,
+        pic_rate,
     )  # fmt: skip
 
 
 def passive_wall(
     cells=10, width=2.0, strain=1.5e-3, friction_angle=30.0, dilatancy_angle=0.0, cohesion=0.0, rough_base=False,
-    duration=0.5, points=3, courant=0.8, pic_rate=10.0, smoothing=True, remapping=True,
+    duration=0.5, points=3, courant=0.8, pic_rate=10.0,
 ):  # fmt: skip
     """Passive resistance."""
     return wall(
         1, cells, width, strain, friction_angle, dilatancy_angle, cohesion, rough_base, duration, points, courant,
-        pic_rate, smoothing, remapping,
+        pic_rate,
     )  # fmt: skip
 
 
@@ -97,7 +96,7 @@ def bearing_capacity_factor(friction_angle):
 
 def footing(
     cells=8, friction_angle=0.0, rough=True, settlement=0.0025, stiffness=20000.0, duration=0.25, points=3, courant=0.8,
-    pic_rate=10.0, smoothing=True, remapping=True,
+    pic_rate=10.0,
 ):  # fmt: skip
     """Press half a strip footing into weightless soil: `cells` elements, 1 m, and half an element.
 
@@ -116,7 +115,6 @@ def footing(
     }  # fmt: skip
     scene = dry_scene(
         "footing", size, width, depth, soil, gravity=0.0, points=points, courant=courant, pic_rate=pic_rate,
-        volumetric_smoothing=smoothing, remapping=remapping,
     )  # fmt: skip
     solver = DrivenSolver(scene, mesh, damping=DAMPING)
     under = np.flatnonzero((np.abs(mesh.nodes[:, 1]) < 1e-9) & (mesh.nodes[:, 0] < 1 + 1e-9))
@@ -134,8 +132,7 @@ def footing(
 
 
 WALL_LADDER = {
-    "cells": (5, 10, 20), "courant": (0.4, 0.8, 1.0), "points": (1, 3, 12), "pic_rate": (0.0, 10.0, 100.0),
-    "smoothing": (False, True), "remapping": (False, True), "friction_angle": (20.0, 30.0, 40.0),
+    "cells": (5, 10, 20), "courant": (0.4, 0.8, 1.0), "points": (1, 3, 12), "pic_rate": (0.0, 10.0, 100.0), "friction_angle": (20.0, 30.0, 40.0),
     "dilatancy_angle": (0.0, 10.0, 30.0),
     "cohesion": (0.0, 2e3), "rough_base": (False, True),
 }  # fmt: skip
@@ -160,8 +157,7 @@ register(Problem(
     source="Prandtl (1920): N_c = 2 + pi", norm="N_c over 2 + pi less 1, mean over the last fifth of the path",
     solve=footing, fast={"cells": 8},
     ladder={
-        "cells": (2, 4, 8, 16), "courant": (0.4, 0.8, 1.0), "points": (1, 3, 12), "pic_rate": (0.0, 10.0, 100.0),
-        "smoothing": (False, True), "remapping": (False, True), "rough": (False, True),
+        "cells": (2, 4, 8, 16), "courant": (0.4, 0.8, 1.0), "points": (1, 3, 12), "pic_rate": (0.0, 10.0, 100.0), "rough": (False, True),
         "friction_angle": (0.0, 10.0, 20.0), "stiffness": (10000.0, 20000.0, 40000.0),
     },
     limit=0.05,

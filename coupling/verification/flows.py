@@ -57,8 +57,7 @@ def lube_height(aspect):
 
 
 def column_collapse(
-    aspect=2.0, cells=10, friction_angle=31.0, stiffness=300.0, points=12, courant=0.8, pic_rate=10.0, smoothing=True,
-    remapping=True, times=6.0,
+    aspect=2.0, cells=10, friction_angle=31.0, stiffness=300.0, points=12, courant=0.8, pic_rate=10.0, times=6.0,
 ):  # fmt: skip
     """Let a column of dry sand, 1 m long, `cells` elements, and `aspect` m high, fall aside on a rough floor.
 
@@ -76,7 +75,6 @@ def column_collapse(
     }  # fmt: skip
     scene = dry_scene(
         "column", size, x[-1], rows * size, soil, points=points, courant=courant, pic_rate=pic_rate,
-        volumetric_smoothing=smoothing, remapping=remapping,
     )  # fmt: skip
     solver = Solver(scene, mesh, threads=1)
     end = times * np.sqrt(aspect / gravity)
@@ -98,7 +96,7 @@ def column_collapse(
     )  # fmt: skip
 
 
-def water(name, mesh, size, width, depth, points, courant, pic_rate, smoothing, remapping, pressure_filter):
+def water(name, mesh, size, width, depth, points, courant, pic_rate, pressure_filter):
     """A solver of water alone: a suspension of grains as heavy as water, too loose to touch, tied to it by drag.
 
     The solver has no phase without grains; these take 11 % of the volume, carry no stress and follow the water, so
@@ -118,7 +116,7 @@ def water(name, mesh, size, width, depth, points, courant, pic_rate, smoothing, 
             "points_per_element": points,
         },
         "numerics": {
-            "courant": courant, "pic_rate": pic_rate, "volumetric_smoothing": smoothing, "remapping": remapping,
+            "courant": courant, "pic_rate": pic_rate,
             "pressure_filter": pressure_filter,
         },
         "stop": {"time": 1.0}, "output": {"interval": 1.0},
@@ -140,7 +138,7 @@ def ritter_depth(x, time, depth, gravity):
 
 
 def dam_break(
-    cells=10, times=4.0, points=12, courant=0.8, pic_rate=10.0, smoothing=True, remapping=True, pressure_filter=0.4,
+    cells=10, times=4.0, points=12, courant=0.8, pic_rate=10.0, pressure_filter=0.4,
 ):  # fmt: skip
     """Water 1 m deep, `cells` elements, behind a dam that vanishes: depth after `times` sqrt(depth / gravity)."""
     size, gravity = 1.0 / cells, 9.81
@@ -150,7 +148,7 @@ def dam_break(
         fixed_bottom=False,
     )  # fmt: skip
     width = (behind + before) * size
-    solver = water("dam", mesh, size, width, 1.0, points, courant, pic_rate, smoothing, remapping, pressure_filter)
+    solver = water("dam", mesh, size, width, 1.0, points, courant, pic_rate, pressure_filter)
     end = times / np.sqrt(gravity)
     with Stopwatch() as watch:
         while solver.time < end:
@@ -178,7 +176,7 @@ MARTIN_MOYCE = np.array([
 
 
 def water_column(
-    cells=10, points=12, courant=0.8, pic_rate=10.0, smoothing=True, remapping=True, pressure_filter=0.4,
+    cells=10, points=12, courant=0.8, pic_rate=10.0, pressure_filter=0.4,
 ):  # fmt: skip
     """A column of water 1 m wide, `cells` elements, and 2 m high collapses: its front over time."""
     size, gravity = 1.0 / cells, 9.81
@@ -186,7 +184,7 @@ def water_column(
         np.arange(7 * cells + 1) * size, np.arange(-2 * cells, 2) * size, lambda x, y: (x < 1) & (y < 0),
         fixed_bottom=False,
     )  # fmt: skip
-    solver = water("column", mesh, size, 7.0, 2.0, points, courant, pic_rate, smoothing, remapping, pressure_filter)
+    solver = water("column", mesh, size, 7.0, 2.0, points, courant, pic_rate, pressure_filter)
     fronts = []
     with Stopwatch() as watch:
         for time, _ in MARTIN_MOYCE:
@@ -209,7 +207,7 @@ register(Problem(
     fast={"aspect": 2.0, "cells": 10, "points": 12},
     ladder={
         "aspect": (0.5, 1.0, 2.0, 4.0), "cells": (5, 10, 20), "courant": (0.4, 0.8, 1.0), "points": (3, 12, 27),
-        "pic_rate": (0.0, 10.0, 100.0), "smoothing": (False, True), "remapping": (False, True),
+        "pic_rate": (0.0, 10.0, 100.0),
         "friction_angle": (25.0, 31.0, 37.0), "stiffness": (100.0, 300.0, 1000.0),
     },
     limit=0.25,
@@ -223,7 +221,7 @@ register(Problem(
     fast={"cells": 10, "points": 12},
     ladder={
         "cells": (5, 10, 20), "times": (2.0, 4.0, 8.0), "courant": (0.4, 0.8, 1.0), "points": (3, 12, 27),
-        "pic_rate": (0.0, 10.0, 100.0), "smoothing": (False, True), "remapping": (False, True),
+        "pic_rate": (0.0, 10.0, 100.0),
         "pressure_filter": (0.0, 0.1, 0.4),
     },
     limit=0.14,
@@ -237,8 +235,7 @@ register(Problem(
     norm="mean error of the front's position over the distance travelled", solve=water_column,
     fast={"cells": 10, "points": 12},
     ladder={
-        "cells": (5, 10, 20), "courant": (0.4, 0.8, 1.0), "points": (3, 12, 27), "pic_rate": (0.0, 10.0, 100.0),
-        "smoothing": (False, True), "remapping": (False, True), "pressure_filter": (0.0, 0.1, 0.4),
+        "cells": (5, 10, 20), "courant": (0.4, 0.8, 1.0), "points": (3, 12, 27), "pic_rate": (0.0, 10.0, 100.0), "pressure_filter": (0.0, 0.1, 0.4),
     },
     limit=0.12,
     why="the gate of the experiment takes time to leave: its front starts 0.1 a behind; no wall friction here",

@@ -43,7 +43,7 @@ def salencon(pressure, initial, cohesion, friction_angle, dilatancy_angle, young
 
 def cavity(
     sectors=10, outer=20.0, friction_angle=30.0, dilatancy_angle=0.0, cohesion=0.1, release=0.9, duration=0.6, points=3,
-    courant=0.8, pic_rate=10.0, smoothing=True, remapping=True,
+    courant=0.8, pic_rate=10.0,
 ):  # fmt: skip
     """Let the wall of a cavity of 1 m radius move inwards until the share `release` of the initial pressure is gone.
 
@@ -57,7 +57,6 @@ def cavity(
     }  # fmt: skip
     scene = dry_scene(
         "cavity", 1.0, 2 * outer, outer, soil, gravity=0.0, points=points, courant=courant, pic_rate=pic_rate,
-        volumetric_smoothing=smoothing, remapping=remapping,
     )  # fmt: skip
     solver = DrivenSolver(scene, mesh, damping=DAMPING)
     solver.points[:, [SXX, SYY, SZZ]] = -initial
@@ -95,8 +94,7 @@ def cavity(
 
 
 def seepage(
-    sectors=10, outer=6.0, conductivity=0.05, duration=1.2, points=3, courant=0.8, pic_rate=10.0, smoothing=True,
-    remapping=True, pressure_filter=0.4,
+    sectors=10, outer=6.0, conductivity=0.05, duration=1.2, points=3, courant=0.8, pic_rate=10.0, pressure_filter=0.4,
 ):  # fmt: skip
     """Water that enters evenly at the outer arc flows to a cavity of 1 m radius: steady excess pressure.
 
@@ -118,7 +116,7 @@ def seepage(
             "points_per_element": points,
         },
         "numerics": {
-            "courant": courant, "pic_rate": pic_rate, "volumetric_smoothing": smoothing, "remapping": remapping,
+            "courant": courant, "pic_rate": pic_rate,
             "pressure_filter": pressure_filter,
         },
         "stop": {"time": 1.0}, "output": {"interval": 1.0},
@@ -152,7 +150,7 @@ def seepage(
 
 def trapdoor(
     cells=8, cover=2.0, friction_angle=30.0, settlement=0.01, duration=1.0, points=3, courant=0.8,
-    pic_rate=10.0, smoothing=True, remapping=True,
+    pic_rate=10.0,
 ):  # fmt: skip
     """Lower a trapdoor of half width 1 m and half an element under `cover` m of sand; load on it over its weight.
 
@@ -164,7 +162,6 @@ def trapdoor(
     soil = {"youngs_modulus": 5e7, "friction_angle": friction_angle}
     scene = dry_scene(
         "trapdoor", size, 4.0, cover, soil, points=points, courant=courant, pic_rate=pic_rate,
-        volumetric_smoothing=smoothing, remapping=remapping,
     )  # fmt: skip
     solver = DrivenSolver(scene, mesh, damping=DAMPING)
     door = mesh.bottom[mesh.nodes[mesh.bottom, 0] < 1 + 1e-9]
@@ -183,7 +180,6 @@ def trapdoor(
 
 def slot(
     cells=8, height=3.0, friction_angle=30.0, stiffness=300.0, times=(0.4, 1.0), points=3, courant=0.8, pic_rate=10.0,
-    smoothing=True, remapping=True,
 ):  # fmt: skip
     """Sand of the given height above a slot of 1 m, `cells` elements, in a floor: its steady outflow.
 
@@ -203,7 +199,6 @@ def slot(
     }  # fmt: skip
     scene = dry_scene(
         "slot", size, width, height + 1.5, soil, points=points, courant=courant, pic_rate=pic_rate,
-        volumetric_smoothing=smoothing, remapping=remapping,
     )  # fmt: skip
     solver = Solver(scene, mesh, threads=1)
     floor = (np.abs(mesh.nodes[:, 1] + height) < 1e-9) & (mesh.nodes[:, 0] > 0.5 - 1e-9)
@@ -225,7 +220,7 @@ def slot(
 
 
 NUMERICS = {
-    "courant": (0.4, 0.8, 1.0), "pic_rate": (0.0, 10.0, 100.0), "smoothing": (False, True), "remapping": (False, True),
+    "courant": (0.4, 0.8, 1.0), "pic_rate": (0.0, 10.0, 100.0),
 }  # fmt: skip
 
 register(Problem(

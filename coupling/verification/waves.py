@@ -17,8 +17,7 @@ HEIGHT = 10.0  # [m]
 
 
 def two_phase_wave(
-    cells=20, conductivity=1.0, bulk_modulus=8e7, mode="fast", periods=2.0, points=3, courant=0.8, pic_rate=0.0,
-    smoothing=True, remapping=True, pressure_filter=0.4, drainage="two-phase",
+    cells=20, conductivity=1.0, bulk_modulus=8e7, mode="fast", periods=2.0, points=3, courant=0.8, pic_rate=0.0, pressure_filter=0.4, drainage="two-phase",
 ):  # fmt: skip
     """Quarter of a standing wave in a column of 10 m, fixed at the bottom, free at the top, under its own weight.
 
@@ -26,8 +25,7 @@ def two_phase_wave(
     "together" of the fast one. The amplitude is so small that no pressure becomes negative near the free surface.
     """
     scene, mesh = column(
-        cells, HEIGHT, conductivity, bulk_modulus, YOUNG, points=points, courant=courant, pic_rate=pic_rate,
-        volumetric_smoothing=smoothing, remapping=remapping, pressure_filter=pressure_filter, drainage=drainage,
+        cells, HEIGHT, conductivity, bulk_modulus, YOUNG, points=points, courant=courant, pic_rate=pic_rate, pressure_filter=pressure_filter, drainage=drainage,
     )  # fmt: skip
     solver = Solver(scene, mesh, threads=1)
     speeds, shapes = modes(bulk_modulus)
@@ -66,7 +64,7 @@ def zero_crossings(times, values):
     return times[k] - values[k] * (times[k + 1] - times[k]) / (values[k + 1] - values[k])
 
 
-def bar(cells=20, periods=5.0, points=3, courant=0.8, pic_rate=0.0, smoothing=True, remapping=True):
+def bar(cells=20, periods=5.0, points=3, courant=0.8, pic_rate=0.0):
     """A bar without lateral strain, fixed at one end, swings in its lowest mode: velocity and energy.
 
     Reference: omega = pi c / (2 L), c^2 = E / rho; the sum of kinetic and strain energy is constant.
@@ -74,7 +72,7 @@ def bar(cells=20, periods=5.0, points=3, courant=0.8, pic_rate=0.0, smoothing=Tr
     size, length = 1.0 / cells, 1.0
     scene = dry_scene(
         "bar", size, 2 * size, length, {"model": "elastic", "poissons_ratio": 0.0}, gravity=1e-9, points=points,
-        courant=courant, pic_rate=pic_rate, volumetric_smoothing=smoothing, remapping=remapping,
+        courant=courant, pic_rate=pic_rate,
     )  # fmt: skip
     solver = Solver(scene, box_mesh([-size, 0.0, size], np.linspace(-1, 0, cells + 1)), threads=1)
     solver.points[:, [SXX, SYY, SZZ, P]] = 0.0
@@ -107,8 +105,7 @@ def bar(cells=20, periods=5.0, points=3, courant=0.8, pic_rate=0.0, smoothing=Tr
 
 
 NUMERICS = {
-    "points": (1, 3, 12), "courant": (0.2, 0.4, 0.8, 1.0), "pic_rate": (0.0, 10.0, 100.0), "smoothing": (False, True),
-    "remapping": (False, True),
+    "points": (1, 3, 12), "courant": (0.2, 0.4, 0.8, 1.0), "pic_rate": (0.0, 10.0, 100.0),
 }  # fmt: skip
 WET = {"cells": (5, 10, 20, 40), **NUMERICS, "pressure_filter": (0.0, 0.1, 0.4), "bulk_modulus": (8e7, 2.2e9)}
 TOO_SLOW = "phase after two periods: 20 linear elements a quarter wave are 0.2 % too slow"
