@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 # Area of a corner over the squared edge below which its stand-in is much larger than it.
 SOFTNESS = 0.05
+WEIGHT, POWER = 2.0, 3
+ENOUGH, SWEEPS = 0.4, 20
 SYSTEM_PACKAGES = "libglu1-mesa libgl1 libxrender1 libxcursor1 libxft2 libxinerama1 libgomp1"
 
 
@@ -170,7 +172,7 @@ def _import_gmsh() -> Any:
 
 
 def relax(
-    nodes: NDArray[np.float64], free: NDArray[np.bool_], cells: NDArray[np.int64], iterations: int
+    nodes: NDArray[np.float64], free: NDArray[np.bool_], cells: NDArray[np.int64], size: NDArray[np.float64], iterations: int
 ) -> NDArray[np.float64]:
     """Move the free nodes until the corners of the cells are as square as the lines allow.
 
@@ -204,7 +206,7 @@ def relax(
 
     def value_and_slope(moved: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         position[movable] = moved
-        return shape_energy(position, elements, softness, slope), slope[movable]
+        return shape_energy(position, elements, softness, size, WEIGHT, POWER, slope), slope[movable]
 
     # Threads of the linear algebra would wait for each other for longer than they compute.
     with threadpool_limits(1):
@@ -212,11 +214,15 @@ def relax(
             value_and_slope, position[movable], jac=True, method="L-BFGS-B", options={"maxiter": iterations}
         )
     position[movable] = result.x
+    count = np.bincount(cells.ravel(), minlength=len(nodes))
+    start = np.concatenate([[0], np.cumsum(count)])
+    around = np.argsort(cells.ravel(), kind="stable") // 4
+    lift_lowest(position, elements, np.sqrt(size), free.ravel(), start, around, ENOUGH, SWEEPS)
     return position.reshape(-1, 2)
 
 
 @kernel
-def shape_energy(position, cells, softness, slope):
+def shape_energy(position, cells, softness, size, weight, power, slope):
     """Sum of squared corner measures of `relax`; their derivatives by the coordinates are written to `slope`."""
     slope[:] = 0.0
     energy = 0.0
@@ -229,9 +235,13 @@ def shape_energy(position, cells, softness, slope):
             root = math.sqrt(area * area + softness[q])
             inverse = 1.0 / (area + root)  # of twice the stand-in for the area
             measure = (ax * ax + ay * ay + bx * bx + by * by) * inverse
-            energy += measure * measure
-            by_length = 4.0 * measure * inverse
-            by_area = -2.0 * measure * measure / root
+            # twice the stand-in over the area asked for, and its inverse
+            small, large = 2.0 * size[q] * inverse, 0.5 * (area + root) / size[q]
+            one = measure * measure + weight * (small + large)
+            energy += one**power
+            factor = power * one ** (power - 1)
+            by_length = factor * 4.0 * measure * inverse
+            by_area = factor * (-2.0 * measure * measure + weight * (large - small)) / root
             gax, gay = by_length * ax + by_area * by, by_length * ay - by_area * bx
             gbx, gby = by_length * bx - by_area * ay, by_length * by + by_area * ax
             slope[a] += gax
@@ -241,6 +251,83 @@ def shape_energy(position, cells, softness, slope):
             slope[i] -= gax + gbx
             slope[i + 1] -= gay + gby
     return energy
+
+
+@kernel
+def lowest_altitude(position, corner):
+    """Smallest altitude of the four triangles of a quadrilateral; negative where its diagonals do not cross."""
+    x0, y0 = position[2 * corner[0]], position[2 * corner[0] + 1]
+    x1, y1 = position[2 * corner[1]], position[2 * corner[1] + 1]
+    fx, fy = position[2 * corner[2]] - x0, position[2 * corner[2] + 1] - y0
+    gx, gy = position[2 * corner[3]] - x1, position[2 * corner[3] + 1] - y1
+    turn = fx * gy - fy * gx
+    if turn <= 0.0:
+        return -1.0
+    # shares of the two diagonals at which they meet
+    s = ((x1 - x0) * gy - (y1 - y0) * gx) / turn
+    t = ((x1 - x0) * fy - (y1 - y0) * fx) / turn
+    if s <= 0.0 or s >= 1.0 or t <= 0.0 or t >= 1.0:
+        return -1.0
+    first, second = math.sqrt(fx * fx + fy * fy), math.sqrt(gx * gx + gy * gy)
+    lowest = math.inf
+    for k in range(4):
+        a, b = 2 * corner[k], 2 * corner[(k + 1) % 4]
+        edge = math.hypot(position[b] - position[a], position[b + 1] - position[a + 1])
+        along = s if k == 0 or k == 3 else 1.0 - s
+        across = t if k < 2 else 1.0 - t
+        longest = max(edge, along * first, across * second)
+        lowest = min(lowest, along * across * turn / longest)
+    return lowest
+
+
+@kernel
+def lift_lowest(position, cells, size, free, start, around, enough, sweeps):
+    """Move free nodes one by one so that the lowest triangle around each becomes higher, over the size asked for.
+
+    position : (2 n,) float64, changed.
+    size : (m,) float64
+    free : (2 n,) bool
+    start, around : (n + 1,), (4 m,) int
+        Cells around node i: ``around[start[i]:start[i + 1]]``.
+    enough : float
+        Where all triangles around a node are as high as that it stays.
+    """
+    for _ in range(sweeps):
+        moved = False
+        for i in range(start.size - 1):
+            if not (free[2 * i] or free[2 * i + 1]):
+                continue
+            first, last = start[i], start[i + 1]
+            lowest, step = math.inf, math.inf
+            for j in range(first, last):
+                q = around[j]
+                lowest = min(lowest, lowest_altitude(position, cells[q]) / size[q])
+                step = min(step, size[q])
+            if lowest >= enough:
+                continue
+            step *= 0.1
+            while step > 1e-3 * size[around[first]]:
+                better = False
+                for k in range(8):
+                    dx = step * math.cos(0.25 * math.pi * k) if free[2 * i] else 0.0
+                    dy = step * math.sin(0.25 * math.pi * k) if free[2 * i + 1] else 0.0
+                    position[2 * i] += dx
+                    position[2 * i + 1] += dy
+                    then = math.inf
+                    for j in range(first, last):
+                        q = around[j]
+                        then = min(then, lowest_altitude(position, cells[q]) / size[q])
+                        if then <= lowest + 1e-6:
+                            break
+                    if then > lowest + 1e-6:
+                        lowest, better, moved = then, True, True
+                        break
+                    position[2 * i] -= dx
+                    position[2 * i + 1] -= dy
+                if not better:
+                    step *= 0.5
+        if not moved:
+            break
 
 
 def crossing(corners: NDArray[np.float64]) -> NDArray[np.float64]:

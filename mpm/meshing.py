@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 # Smallest altitude of a triangle over the cell size asked for at that place; in a square it is 0.5. A mesh as good as
 # the first is taken, one worse than the second refused: flatter triangles would set the time step of the whole run
 # while resolving nothing.
-GOOD_ALTITUDE, MIN_RELATIVE_ALTITUDE = 0.18, 0.1
+GOOD_ALTITUDE, MIN_RELATIVE_ALTITUDE = 0.25, 0.15
 # Rows of regular cells along the linings and meshing algorithms of gmsh (frontal for quadrilaterals, frontal, Delaunay)
 # in the order tried.
 ROWS, ALGORITHMS = (3, 1, 0), (8, 6, 5)
-ITERATIONS = 60
+ITERATIONS = 100
 
 
 def build_mesh(scene: Scene) -> Mesh:
@@ -73,7 +73,9 @@ def _cells(scene: Scene, rows: int, algorithm: int) -> tuple[Outline, NDArray[np
     cells = np.concatenate(outline.cells)
     turned = _area(outline.nodes[cells]) < 0
     cells[turned] = cells[turned][:, ::-1]
-    outline.nodes = relax(outline.nodes, outline.free, cells, ITERATIONS)
+    centre = outline.nodes[cells].mean(axis=1)
+    size = element_size(scene, centre[:, 0], centre[:, 1]) ** 2
+    outline.nodes = relax(outline.nodes, outline.free, cells, size, ITERATIONS)
     beside = len(cells)
     outline.cells = [cells]
     draw_headroom(scene, outline)

@@ -310,7 +310,7 @@ def rows_that_fit(scene: Scene, i: int, lines: list[float], most: int) -> int:
         for j, t in enumerate(scene.tunnels)
         if j != i
     ]
-    return max(0, min(most, int(0.4 * min(clear) / size), max(1, int(0.4 * radius / size))))
+    return max(0, min(most, int(0.4 * min(clear) / size), max(1, int(0.7 * radius / size))))
 
 
 def draw_scene(scene: Scene, rows: int) -> Outline:
