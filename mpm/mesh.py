@@ -1,4 +1,8 @@
-"""The body-fitted triangle mesh: ground around the lining, channel through it, tunnel interior and headroom.
+"""The body-fitted mesh: ground around the lining, channel through it, tunnel interior and headroom.
+
+Every cell is a quadrilateral cut by both diagonals into four linear triangles. They do not lock at constant volume
+where the centre node lies on both diagonals: one of the four constraints follows from the other three (Nagtegaal, Parks
+& Rice 1974).
 
 The outer face, the channel walls and the inner face are mesh lines with nodes exactly on the circles, so contact is a
 condition at nodes; so are the ground surface and the soil layer boundaries.
@@ -27,14 +31,15 @@ class MeshError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Linear triangles with the node sets that contact and boundaries need.
+    """Crossed quadrilaterals with the node sets that contact and boundaries need.
 
     Attributes
     ----------
     nodes : (n, 2) float64
         Coordinates [m]; y = 0 is the ground surface.
     elements : (m, 3) int32
-        Nodes of each triangle, counter-clockwise; sorted along a space-filling curve.
+        Nodes of each triangle, counter-clockwise. Element 4 q + k has corners k and k + 1 (mod 4) of cell q, and the
+        centre node of that cell, which no other has. Cells are sorted along a space-filling curve.
     region : (m,) int8
         0 soil, 1 channel, 2 tunnel interior, 3 headroom.
     left, right, bottom, top : (k,) int32
@@ -79,6 +84,11 @@ class Mesh:
     inner_opening_nodes: NDArray[np.int32]
     gate_angle: float
 
+    @property
+    def cells(self) -> NDArray[np.int32]:
+        """Corners of the quadrilateral cells, counter-clockwise: (n_cells, 4); cell q owns elements 4 q to 4 q + 3."""
+        return self.elements[:, 0].reshape(-1, 4)
+
     @cached_property
     def quality(self) -> dict[str, float]:
         """Counts, smallest altitude and its place [m], extreme angles [deg], share of triangles with one below 30."""
@@ -107,7 +117,7 @@ class Mesh:
             outer_theta.append(reflected[order])
         return Mesh(
             nodes=self.nodes * np.array([-1.0, 1.0]),
-            elements=np.ascontiguousarray(self.elements[:, [0, 2, 1]]),
+            elements=np.ascontiguousarray(self.elements.reshape(-1, 4, 3)[:, ::-1, [1, 0, 2]].reshape(-1, 3)),
             region=self.region,
             left=self.right,
             right=self.left,

@@ -1,30 +1,31 @@
-"""From a scene to its mesh, by gmsh."""
+"""From a scene to its mesh of quadrilateral cells, each cut by both diagonals into four triangles."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mpm.element_size import element_size, headroom_height, size_callback
-from mpm.half_model import right_half, with_mirror_image
-from mpm.mesh import Mesh, MeshError, altitudes, areas
-from mpm.outline import Drawing, Outline, draw_scene
+from mpm.element_size import element_size
+from mpm.filling import crossing, fill_faces, relax
+from mpm.half_model import with_mirror_image
+from mpm.mesh import Mesh, MeshError, altitudes
+from mpm.outline import Outline, draw_headroom, draw_scene
 from mpm.scene import Scene
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Smallest altitude over the size asked for at that place; equilateral is 0.87. Flatter triangles would set the time
-# step of the whole run while resolving nothing.
-MIN_RELATIVE_ALTITUDE = 0.3
-# Meshing algorithms of gmsh in the order tried until no triangle is flatter than that: frontal, Delaunay, adaptive.
-ALGORITHMS = (6, 5, 1)
-# Share of the element size within which a node belongs to the mirror line x = 0 of a half model: those of the strip
-# through the gate are relocated by some thousandths.
-ON_MIRROR_LINE = 0.02
-SYSTEM_PACKAGES = "libglu1-mesa libgl1 libxrender1 libxcursor1 libxft2 libxinerama1 libgomp1"
+# Smallest altitude of a triangle over the cell size asked for at that place; in a square it is 0.5. A mesh as good as
+# the first is taken, one worse than the second refused: flatter triangles would set the time step of the whole run
+# while resolving nothing.
+GOOD_ALTITUDE, MIN_RELATIVE_ALTITUDE = 0.25, 0.15
+# Rows of regular cells along the linings and meshing algorithms of gmsh (frontal for quadrilaterals, frontal, Delaunay)
+# in the order tried.
+ROWS, ALGORITHMS = (3, 1, 0), (8, 6, 5)
+ITERATIONS = 100
 
 
 def build_mesh(scene: Scene) -> Mesh:
@@ -44,144 +45,117 @@ def build_mesh(scene: Scene) -> Mesh:
     MeshError
         When a triangle would be much flatter than the size asked for, or gmsh or its system libraries fail.
     """
-    gmsh = _import_gmsh()
-    best: tuple[float, Mesh] | None = None
-    for algorithm in ALGORITHMS:
-        mesh = _mesh_once(scene, gmsh, algorithm)
-        if scene.is_half:
-            mesh = with_mirror_image(right_half(mesh))
-        centre = mesh.nodes[mesh.elements].mean(axis=1)
-        relative = altitudes(mesh.nodes, mesh.elements) / element_size(scene, centre[:, 0], centre[:, 1])
-        flattest = float(relative.min())
-        if best is None or flattest > best[0]:
-            best = flattest, mesh
-        if flattest >= MIN_RELATIVE_ALTITUDE:
-            return mesh
+    best: tuple[float, NDArray[np.float64], Outline, NDArray[np.int64]] | None = None
+    for rows, algorithm in product(ROWS, ALGORITHMS):
+        outline, cells = _cells(scene, rows, algorithm)
+        lowest, where = _flattest(scene, outline.nodes, cells)
+        if best is None or lowest > best[0]:
+            best = lowest, where, outline, cells
+        if lowest >= GOOD_ALTITUDE:
+            break
     assert best is not None
-    quality = best[1].quality
-    raise MeshError(
-        f"mesh: the flattest triangle must be at least {MIN_RELATIVE_ALTITUDE:g} element sizes high, got {best[0]:.2g} "
-        f"({quality['min_altitude']:.2g} m, flattest near x = {quality['min_altitude_x']:.2f} m, "
-        f"y = {quality['min_altitude_y']:.2f} m); keep soil layers, tunnels and box sides further apart or refine there"
-    )
+    lowest, where, outline, cells = best
+    if lowest < MIN_RELATIVE_ALTITUDE:
+        size = float(element_size(scene, *where))
+        raise MeshError(
+            f"mesh: the flattest triangle must be at least {MIN_RELATIVE_ALTITUDE:g} element sizes high, got "
+            f"{lowest:.2g} ({lowest * size:.2g} m, flattest near x = {where[0]:.2f} m, y = {where[1]:.2f} m); "
+            "keep soil layers, tunnels and box sides further apart or refine there"
+        )
+    mesh = _assemble(scene, outline, cells)
+    return with_mirror_image(mesh) if scene.is_half else mesh
 
 
-def _mesh_once(scene: Scene, gmsh: Any, algorithm: int) -> Mesh:
-    """One attempt with one gmsh algorithm."""
-    # gmsh is one global session: leave a caller's own session as it was.
-    mine = not gmsh.isInitialized()
-    if mine:
-        gmsh.initialize(interruptible=False, readConfigFiles=False)
-    previous = None if mine else gmsh.model.getCurrent()
-    name = "gushing scene"
-    try:
-        for option, value in {
-            "General.Terminal": 0,
-            "General.NumThreads": 1,
-            "Mesh.Algorithm": algorithm,
-            "Mesh.MeshSizeExtendFromBoundary": 0,
-            "Mesh.MeshSizeFromPoints": 0,
-            "Mesh.MeshSizeFromCurvature": 0,
-            "Mesh.Optimize": 1,
-        }.items():
-            gmsh.option.setNumber(option, value)
-        gmsh.model.add(name)
-        draw, outline, regions, sides = draw_scene(scene, gmsh)
-        gmsh.model.mesh.setSizeCallback(size_callback(scene))
-        gmsh.model.mesh.generate(2)
-        gmsh.model.mesh.optimize("Relocate2D")
-        return _extract(scene, gmsh, draw, outline, regions, sides)
-    except MeshError:
-        raise
-    except Exception as error:
-        # gmsh raises bare Exception with its last message.
-        raise MeshError(f"mesh: gmsh could not mesh the scene ({error}); check distances between its parts") from error
-    finally:
-        gmsh.model.mesh.removeSizeCallback()
-        if mine:
-            gmsh.finalize()
-        else:
-            gmsh.model.setCurrent(name)
-            gmsh.model.remove()
-            if previous is not None:
-                gmsh.model.setCurrent(previous)
+def _cells(scene: Scene, rows: int, algorithm: int) -> tuple[Outline, NDArray[np.int64]]:
+    """One attempt: an outline with all its nodes, and the corners of its cells, counter-clockwise."""
+    outline = draw_scene(scene, rows)
+    fill_faces(scene, outline, algorithm)
+    cells = np.concatenate(outline.cells)
+    turned = _area(outline.nodes[cells]) < 0
+    cells[turned] = cells[turned][:, ::-1]
+    centre = outline.nodes[cells].mean(axis=1)
+    size = element_size(scene, centre[:, 0], centre[:, 1]) ** 2
+    outline.nodes = relax(outline.nodes, outline.free, cells, size, ITERATIONS)
+    beside = len(cells)
+    outline.cells = [cells]
+    draw_headroom(scene, outline)
+    cells = np.concatenate(outline.cells)
+    turned = np.flatnonzero(_area(outline.nodes[cells[beside:]]) < 0) + beside
+    cells[turned] = cells[turned][:, ::-1]
+    return outline, cells
 
 
-def _extract(
-    scene: Scene,
-    gmsh: Any,
-    draw: Drawing,
-    outline: Outline,
-    regions: dict[int, int],
-    sides: dict[str, list[int]],
-) -> Mesh:
-    """Arrays of the current gmsh mesh, sorted for locality."""
-    tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    node_of_tag = np.full(int(tags.max()) + 1, -1, dtype=np.int64)
-    node_of_tag[tags] = np.arange(len(tags))
-    nodes = coordinates.reshape(-1, 3)[:, :2].copy()
-    elements, region = [], []
-    for surface, kind in regions.items():
-        triangles = gmsh.model.mesh.getElementsByType(2, surface)[1].reshape(-1, 3)
-        elements.append(node_of_tag[triangles])
-        region.append(np.full(len(triangles), kind, dtype=np.int8))
-    triangles, kinds = np.concatenate(elements), np.concatenate(region)
-    flipped = areas(nodes, triangles) < 0
-    triangles[flipped] = triangles[flipped][:, [0, 2, 1]]
-    order = np.argsort(_hilbert(nodes[triangles].mean(axis=1)), kind="stable")
-    triangles, kinds = triangles[order], kinds[order]
+def _area(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Area of quadrilaterals, (m,), positive when counter-clockwise."""
+    first, second = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+    return 0.5 * (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
+
+
+def _crossed(
+    nodes: NDArray[np.float64], cells: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Nodes with the centres of the cells behind them, and the four triangles of each cell."""
+    number = np.broadcast_to(len(nodes) + np.arange(len(cells))[:, None], cells.shape)
+    triangles = np.stack([cells, np.roll(cells, -1, axis=1), number], axis=-1).reshape(-1, 3)
+    return np.concatenate([nodes, crossing(nodes[cells])]), triangles
+
+
+def _flattest(
+    scene: Scene, nodes: NDArray[np.float64], cells: NDArray[np.int64]
+) -> tuple[float, NDArray[np.float64]]:
+    """Smallest altitude over the size asked for, and the place of that triangle."""
+    points, triangles = _crossed(nodes, cells)
+    middle = points[triangles].mean(axis=1)
+    relative = altitudes(points, triangles) / element_size(scene, middle[:, 0], middle[:, 1])
+    relative = np.nan_to_num(relative, nan=-1.0)
+    worst = int(relative.argmin())
+    return float(relative[worst]), nodes[cells[worst // 4]].mean(axis=0)
+
+
+def _assemble(scene: Scene, outline: Outline, cells: NDArray[np.int64]) -> Mesh:
+    """The mesh, sorted for locality."""
+    order = np.argsort(_hilbert(outline.nodes[cells].mean(axis=1)), kind="stable")
+    nodes, triangles = _crossed(outline.nodes, cells[order])
+    region = np.repeat(np.array(outline.region, np.int8)[order], 4)
     # Nodes numbered by first use, so that neighbours in space are neighbours in memory; unused ones drop out.
     used, first = np.unique(triangles.ravel(), return_index=True)
     used = used[np.argsort(first)]
     renumber = np.full(len(nodes), -1, dtype=np.int64)
     renumber[used] = np.arange(len(used))
-    nodes, triangles = nodes[used], renumber[triangles]
+    nodes = nodes[used]
 
-    node_of_point = {tag: int(renumber[node_of_tag[gmsh.model.mesh.getNodes(0, tag)[0][0]]]) for tag in draw.exact}
-    for tag, position in draw.exact.items():
-        nodes[node_of_point[tag]] = position
+    def numbers(chosen: NDArray[np.int64] | list[int]) -> NDArray[np.int32]:
+        return renumber[np.asarray(chosen, np.int64)].astype(np.int32)
 
-    def numbers(points: list[int]) -> NDArray[np.int32]:
-        return np.array([node_of_point[tag] for tag in points], dtype=np.int32)
+    def on_side(axis: int, value: float) -> NDArray[np.int32]:
+        members = np.flatnonzero(nodes[:, axis] == value)
+        return members[np.argsort(nodes[members, 1 - axis])].astype(np.int32)
 
-    box: dict[str, NDArray[np.int32]] = {}
-    places = {"left": (0, -scene.box.width / 2), "right": (0, scene.box.width / 2)}
-    places |= {"bottom": (1, -scene.box.depth), "top": (1, headroom_height(scene))}
-    for name, curves in sides.items():
-        on_side = np.concatenate([gmsh.model.mesh.getNodes(1, abs(curve), includeBoundary=True)[0] for curve in curves])
-        members = np.unique(renumber[node_of_tag[on_side]])
-        axis, value = places[name]
-        nodes[members, axis] = value
-        box[name] = members[np.argsort(nodes[members, 1 - axis])].astype(np.int32)
-
-    if scene.is_half:
-        nodes[np.abs(nodes[:, 0]) < ON_MIRROR_LINE * element_size(scene, nodes[:, 0], nodes[:, 1]), 0] = 0.0
-    outer_nodes, outer_theta = [], []
-    for chain, theta in zip(outline.outer, outline.theta, strict=True):
-        angle = np.mod(np.array(theta), 360.0)
-        ascending = np.argsort(angle)
-        outer_nodes.append(numbers(chain)[ascending])
-        outer_theta.append(angle[ascending])
-    walls: list[int] = []
-    wall_side: list[int] = []
-    for side, wall, inner in zip((1, -1), outline.walls, outline.inner_corners, strict=False):
-        walls += [*wall, inner]
-        wall_side += [side] * (len(wall) + 1)
+    half = scene.box.width / 2
+    sides = [1] if len(outline.corners) else []
+    if len(outline.corners) == 2:
+        sides = [1, -1]
+    elif scene.is_half and scene.gate is not None and scene.gate.angle == 0:
+        sides = [-1]
+    wall_nodes = [numbers(wall) for wall in outline.walls]
     return Mesh(
         nodes=np.ascontiguousarray(nodes),
-        elements=np.ascontiguousarray(triangles, dtype=np.int32),
-        region=kinds,
-        outer_nodes=tuple(outer_nodes),
-        outer_theta=tuple(outer_theta),
+        elements=np.ascontiguousarray(renumber[triangles], dtype=np.int32),
+        region=region,
+        left=on_side(0, 0.0 if scene.is_half else -half),
+        right=on_side(0, half),
+        bottom=on_side(1, -scene.box.depth),
+        top=on_side(1, float(nodes[:, 1].max())),
+        outer_nodes=tuple(numbers(ring) for ring in outline.outer),
+        outer_theta=tuple(outline.theta),
         opening_nodes=numbers(outline.opening),
         corner_nodes=numbers(outline.corners),
-        wall_nodes=numbers(walls),
-        wall_side=np.array(wall_side, dtype=np.int8),
-        corner_side=np.array([1, -1][: len(outline.corners)], dtype=np.int8),
+        wall_nodes=np.concatenate([np.zeros(0, np.int32), *wall_nodes]),
+        wall_side=np.repeat(np.array(sides, np.int8), [len(wall) for wall in wall_nodes]),
+        corner_side=np.array(sides, dtype=np.int8),
         inner_nodes=numbers(outline.inner),
         inner_opening_nodes=numbers(outline.inner_opening),
         gate_angle=math.nan if scene.gate is None else scene.gate.angle % 360.0,
-        **box,
     )
 
 
@@ -200,14 +174,3 @@ def _hilbert(positions: NDArray[np.float64], bits: int = 16) -> NDArray[np.int64
         swap = up == 0
         x, y = np.where(swap, y, x), np.where(swap, x, y)
     return index
-
-
-def _import_gmsh() -> Any:
-    try:
-        import gmsh
-    except OSError as error:
-        raise MeshError(
-            f"meshing needs system libraries that are missing ({error}); "
-            f"on Debian or Ubuntu type: sudo apt-get install -y {SYSTEM_PACKAGES}"
-        ) from error
-    return gmsh

@@ -1,11 +1,15 @@
-"""The outline that gmsh meshes: rings, channel, soil layers and box, drawn with the nodes they must have."""
+"""The lines that cells must fit, divided into their edges, and the regular cells along the linings and in the channel.
+
+What lies between is filled by gmsh (`mpm.filling`) with cells of twice the size, which are cut into quarters: every
+line between two of its fixed nodes therefore has an even number of edges.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,247 +18,443 @@ from mpm.mesh import CHANNEL, HEADROOM, INTERIOR, SOIL, MeshError
 from mpm.scene import Scene, Tunnel
 
 if TYPE_CHECKING:
-    pass
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+    Nodes = NDArray[np.int64]
+
+# Samples of the element size along a line that is divided.
+SAMPLES = 2001
+# A water table closer than this to a soil layer boundary or the surface, in element sizes there, is no mesh line: the
+# cells between the two would be flatter than a kink of the pore pressure inside a cell is wrong.
+NEAR_LINE = 1.5
 
 
-def _divide(scene: Scene, tunnel: Tunnel, radius: float, start: float, end: float) -> list[float]:
-    """Angles [deg] strictly between `start` and `end` that divide the arc into edges of the local size."""
-    theta = np.linspace(start, end, 2001)
-    rad = np.radians(theta)
-    size = element_size(scene, tunnel.x + radius * np.sin(rad), -tunnel.axis_depth + radius * np.cos(rad))
-    density = radius * math.radians(end - start) / 2000 / size
-    cumulative = np.concatenate([[0.0], np.cumsum((density[1:] + density[:-1]) / 2)])
-    count = max(1, math.ceil(cumulative[-1] - 0.25))
-    return [float(v) for v in np.interp(np.arange(1, count) * cumulative[-1] / count, cumulative, theta)]
+@dataclass
+class Face:
+    """What gmsh fills: loops and inner lines of nodes, every second of which is a node of the coarse mesh."""
 
-
-def _ring(scene: Scene, tunnel: Tunnel, radius: float, forced: list[float]) -> list[float]:
-    """Angles [deg, ascending from forced[0], within one turn] of the nodes of a ring through the `forced` angles."""
-    stations = [*forced, forced[0] + 360.0]
-    result: list[float] = []
-    for start, end in pairwise(stations):
-        result += [start, *_divide(scene, tunnel, radius, start, end)]
-    return result
-
-
-def _layer_angles(scene: Scene, tunnel: Tunnel) -> list[float]:
-    """Angles [deg] at which soil layer boundaries meet the tunnel's outer face."""
-    result = []
-    for soil in scene.soils[1:]:
-        cosine = (-soil.top_depth + tunnel.axis_depth) / tunnel.outer_radius
-        if abs(cosine) < 1:
-            theta = math.degrees(math.acos(cosine))
-            result += [theta, 360.0 - theta]
-    return result
-
-
-class Drawing:
-    """Points and one-element lines of a gmsh geometry, each made once."""
-
-    def __init__(self, gmsh: Any) -> None:
-        self.gmsh = gmsh
-        self.geo = gmsh.model.geo
-        self.lines: dict[tuple[int, int], int] = {}
-        self.exact: dict[int, tuple[float, float]] = {}
-
-    def point(self, x: float, y: float) -> int:
-        tag: int = self.geo.addPoint(x, y, 0.0)
-        self.exact[tag] = (x, y)
-        return tag
-
-    def line(self, a: int, b: int) -> int:
-        if (b, a) in self.lines:
-            return -self.lines[b, a]
-        if (a, b) not in self.lines:
-            self.lines[a, b] = self.geo.addLine(a, b)
-        return self.lines[a, b]
-
-    def chain(self, points: list[int]) -> list[int]:
-        """Lines from each point to the next."""
-        return [self.line(a, b) for a, b in pairwise(points)]
-
-    def on_axis(self, points: list[int]) -> int:
-        """The point nearest to x = 0."""
-        return min(points, key=lambda tag: abs(self.exact[tag][0]))
-
-    def edges(self, chain: list[int]) -> list[int]:
-        """Lines that are one mesh edge each."""
-        tags = self.chain(chain)
-        for tag in tags:
-            self.geo.mesh.setTransfiniteCurve(abs(tag), 2)
-        return tags
-
-    def surface(self, *loops: list[int]) -> int:
-        tag: int = self.geo.addPlaneSurface([self.geo.addCurveLoop(loop) for loop in loops])
-        return tag
-
-
-def _on_ring(draw: Drawing, tunnel: Tunnel, radius: float, theta: list[float]) -> list[int]:
-    return [
-        draw.point(
-            tunnel.x + radius * math.sin(math.radians(t)), -tunnel.axis_depth + radius * math.cos(math.radians(t))
-        )
-        for t in theta
-    ]
+    region: int
+    loops: list[list[Nodes]]
+    lines: list[Nodes]
 
 
 @dataclass
 class Outline:
-    """gmsh point tags (later node numbers) of the lining, per tunnel and at the gate."""
+    """Nodes and regular cells, the faces left to be filled, and the nodes of lining and gate."""
 
-    outer: list[list[int]]
-    theta: list[list[float]]
-    opening: list[int]
-    corners: list[int]
-    walls: list[list[int]]
-    inner: list[int]
-    inner_corners: list[int]
-    inner_opening: list[int]
+    nodes: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
+    free: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 2), bool))
+    cells: list[Nodes] = field(default_factory=list)
+    region: list[int] = field(default_factory=list)
+    faces: list[Face] = field(default_factory=list)
+    ground: Nodes = field(default_factory=lambda: np.zeros(0, np.int64))
+    outer: list[Nodes] = field(default_factory=list)
+    theta: list[NDArray[np.float64]] = field(default_factory=list)
+    corners: Nodes = field(default_factory=lambda: np.zeros(0, np.int64))
+    opening: Nodes = field(default_factory=lambda: np.zeros(0, np.int64))
+    walls: list[Nodes] = field(default_factory=list)
+    inner: Nodes = field(default_factory=lambda: np.zeros(0, np.int64))
+    inner_opening: Nodes = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def add(self, positions: ArrayLike, free_x: ArrayLike = False, free_y: ArrayLike = False) -> Nodes:
+        """New nodes, and whether they may move along x and y; their numbers."""
+        positions = np.asarray(positions, float).reshape(-1, 2)
+        free = np.zeros((len(positions), 2), bool)
+        free[:, 0], free[:, 1] = free_x, free_y
+        first = len(self.nodes)
+        self.nodes = np.concatenate([self.nodes, positions])
+        self.free = np.concatenate([self.free, free])
+        return np.arange(first, len(self.nodes))
+
+    def add_grid(self, grid: Nodes, region: int) -> None:
+        """Cells between neighbouring rows and columns of nodes."""
+        cells = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=-1).reshape(-1, 4)
+        self.cells.append(cells)
+        self.region += [region] * len(cells)
 
 
-def _draw_lining(scene: Scene, draw: Drawing) -> Outline:
-    """Points of every outer face, and of channel and inner face at the gate."""
-    outline = Outline([], [], [], [], [], [], [], [])
-    gate = scene.gate
-    for i, tunnel in enumerate(scene.tunnels):
-        layers = _layer_angles(scene, tunnel)
-        if gate is None or gate.tunnel != i:
-            stations = sorted({*layers, 0.0, 90.0, 180.0, 270.0} if not layers else {*layers, 0.0, 180.0})
-            theta = _ring(scene, tunnel, tunnel.outer_radius, stations)
-            outline.outer.append(_on_ring(draw, tunnel, tunnel.outer_radius, theta))
-            outline.theta.append(theta)
-            continue
+def place(tunnel: Tunnel, radius: ArrayLike, theta: ArrayLike) -> NDArray[np.float64]:
+    """Positions at angles [deg] about a tunnel's axis; those of a multiple of 90 degrees are exact."""
+    theta = np.asarray(theta, float)
+    rad = np.radians(theta)
+    sine, cosine = np.sin(rad), np.cos(rad)
+    sine = np.where(np.mod(theta, 180.0) == 0, 0.0, sine)
+    cosine = np.where(np.mod(theta, 180.0) == 90, 0.0, cosine)
+    return np.stack([tunnel.x + radius * sine, -tunnel.axis_depth + radius * cosine], axis=-1)
+
+
+def _cumulative(scene: Scene, path: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Number of edges of the local size from the beginning of a path to each of its points."""
+    density = 1 / element_size(scene, path[:, 0], path[:, 1])
+    length = np.hypot(*np.diff(path, axis=0).T)
+    return np.concatenate([[0.0], np.cumsum(length * (density[1:] + density[:-1]) / 2)])
+
+
+def _divide(cumulative: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Shares of a path's parameter at which `count` edges begin and end, each of the same number of local sizes."""
+    share = np.interp(
+        np.arange(1, count) * cumulative[-1] / count, cumulative, np.linspace(0, 1, len(cumulative))
+    )
+    return np.concatenate([[0.0], share, [1.0]])
+
+
+def _line(scene: Scene, outline: Outline, start: int, end: int, beside: list[Nodes] | None = None) -> Nodes:
+    """Nodes of a horizontal or vertical line from node to node: an even number of edges.
+
+    With the lines `beside` it, which close a loop with it, there are four times as many edges as a whole number.
+    """
+    a, b = outline.nodes[start], outline.nodes[end]
+    cumulative = _cumulative(scene, a + np.linspace(0, 1, SAMPLES)[:, None] * (b - a))
+    pairs = max(1, round(cumulative[-1] / 2))
+    if beside is not None and (sum(len(line) - 1 for line in beside) // 2 + pairs) % 2:
+        pairs += 1 if pairs == 1 or pairs < cumulative[-1] / 2 else -1
+    share = _divide(cumulative, 2 * pairs)[1:-1, None]
+    horizontal = a[1] == b[1]
+    between = outline.add(a + share * (b - a), horizontal, not horizontal)
+    outline.nodes[between, 1 if horizontal else 0] = a[1 if horizontal else 0]
+    return np.concatenate([[start], between, [end]])
+
+
+@dataclass
+class _Ring:
+    """Angles [deg, ascending] of the nodes of a circle; a whole one is closed, that of a half model runs to 180."""
+
+    theta: NDArray[np.float64]
+    closed: bool
+    cuts: list[int]
+    opening: NDArray[np.int64]
+
+
+def _ring(
+    scene: Scene, tunnel: Tunnel, radius: float, cuts: list[float], has_gate: bool, multiple: int = 2
+) -> _Ring:
+    """Divide a circle. Between two cuts, and around as a whole, there is an even number of edges or a `multiple`.
+
+    cuts : angles [deg] where horizontal lines meet the circle.
+    """
+    half_model, gate = scene.is_half, scene.gate
+    opening = np.zeros(0)
+    if has_gate:
+        assert gate is not None
         n = scene.discretisation.elements_across_gate
-        half = math.degrees(math.asin(gate.width / 2 / tunnel.outer_radius))
-        blocked = [t for t in layers if abs((t - gate.angle + 180) % 360 - 180) < 1.5 * half]
-        if blocked:
-            raise MeshError(
-                f"gate: must not touch a soil layer boundary on the lining, got gate angle {gate.angle:g} deg and a "
-                f"boundary at {blocked[0]:.4g} deg; move the layer or the gate by the gate's width"
-            )
-        opening = [gate.angle + half * (2 * k / n - 1) for k in range(n + 1)]
-        rest = [opening[-1] + (t - opening[-1]) % 360.0 for t in layers]
-        # The point opposite the gate keeps the ring's nodes symmetric about the gate's axis.
-        stations = sorted([opening[-1], *rest, gate.angle + 180.0])
-        stations.append(opening[0] + 360.0)
-        outside = [stations[0]]
-        for start, end in pairwise(stations):
-            outside += [*_divide(scene, tunnel, tunnel.outer_radius, start, end), end]
-        theta = opening + outside[1:-1]
-        tags = _on_ring(draw, tunnel, tunnel.outer_radius, theta)
-        outline.outer.append(tags)
-        outline.theta.append(theta)
-        outline.corners = [tags[0], tags[n]]
-        outline.opening = tags[1:n]
-        _draw_channel(scene, draw, outline, tunnel, n)
+        half = math.degrees(math.asin(gate.width / 2 / radius))
+        opening = gate.angle + half * (2 * np.arange(n + 1) / n - 1)
+    if half_model:
+        opening = opening[(opening >= -1e-9) & (opening <= 180 + 1e-9)] if gate is not None else opening
+        stations = {0.0, 180.0, *cuts}
+        if len(opening):
+            opening[[0, -1]] = (0.0, opening[-1]) if gate is not None and gate.angle == 0 else (opening[0], 180.0)
+            stations |= {float(opening[0]), float(opening[-1])}
+        elif not cuts:
+            stations |= {90.0}
+        ends = sorted(stations)
+    elif has_gate:
+        assert gate is not None
+        start = float(opening[-1])
+        # The point opposite the gate keeps the ring's nodes symmetric about the gate's axis; so does an odd rest.
+        opposite = [gate.angle + 180.0] if not cuts and len(opening) % 2 else []
+        ends = sorted([start, *(start + (t - start) % 360.0 for t in cuts), *opposite, float(opening[0]) + 360.0])
+        ends.append(start + 360.0)
+    else:
+        ends = sorted({0.0, 90.0, 180.0, 270.0} if not cuts else {*cuts, 0.0, 180.0})
+        ends.append(ends[0] + 360.0)
+    hard = {t % 360.0 for t in cuts} | ({0.0, 180.0} if half_model else set())
+    arcs = list(pairwise(ends))
+    is_opening = [len(opening) > 0 and abs((a - opening[0]) % 360.0) < 1e-9 for a, _ in arcs]
+    measure = [
+        _cumulative(scene, place(tunnel, radius, np.linspace(a, b, SAMPLES))) for a, b in arcs
+    ]
+    counts = [
+        len(opening) - 1 if open_ else max(1, math.ceil(m[-1] - 0.25))
+        for m, open_ in zip(measure, is_opening, strict=True)
+    ]
+    _make_even(arcs, counts, is_opening, hard, measure, closed=not half_model)
+    while multiple > 2 and sum(counts) % multiple:
+        counts = [count + (not open_) for count, open_ in zip(counts, is_opening, strict=True)]
+    theta: list[float] = []
+    for (a, b), m, count, open_ in zip(arcs, measure, counts, is_opening, strict=True):
+        theta += list(opening[:-1] + (a - opening[0])) if open_ else list(a + _divide(m, count)[:-1] * (b - a))
+    if half_model:
+        theta.append(180.0)
+    angles = np.array(theta)
+    if not half_model:
+        angles = np.mod(angles, 360.0)
+        angles = np.where(angles > 360.0 - 1e-12, 0.0, angles)
+        angles = np.sort(angles)
+    def nearest(value: float) -> int:
+        return int(np.argmin(np.abs((angles - value + 180.0) % 360.0 - 180.0)))
+
+    return _Ring(angles, not half_model, [nearest(t) for t in cuts], np.array([nearest(t) for t in opening], int))
+
+
+def _make_even(arcs, counts, is_opening, hard, measure, closed):
+    """Give an arc one edge more or less where the number of edges between two hard stations is odd."""
+    n = len(arcs)
+    starts = [i for i, (a, _) in enumerate(arcs) if a % 360.0 in hard] or [0]
+    for first, last in zip(starts, [*starts[1:], starts[0] + n if closed else n], strict=True):
+        group = [i % n for i in range(first, last)]
+        if sum(counts[i] for i in group) % 2:
+            longest = max((i for i in group if not is_opening[i]), key=lambda i: counts[i])
+            fewer = counts[longest] > 1 and measure[longest][-1] < counts[longest]
+            counts[longest] += -1 if fewer and counts[longest] > 3 else 1
+
+
+def _rows(scene, outline, tunnel, ring, face, radius, count, outward, heights):
+    """Regular rows of cells along a circle: (nodes of ring, count + 1) node numbers, `face` first.
+
+    Their thickness is that of the ring's edges; columns through a cut follow its horizontal line.
+    """
+    theta = ring.theta
+    rad = np.radians(theta)
+    edge = radius * np.diff(np.concatenate([rad, [rad[0] + 2 * math.pi]]) if ring.closed else rad)
+    if ring.closed:
+        thickness = 0.5 * (edge + np.roll(edge, 1))
+        for _ in range(2):
+            thickness = 0.5 * thickness + 0.25 * (np.roll(thickness, 1) + np.roll(thickness, -1))
+    else:
+        thickness = 0.5 * (np.concatenate([edge[:1], edge]) + np.concatenate([edge, edge[-1:]]))
+        for _ in range(2):
+            padded = np.concatenate([thickness[1:2], thickness, thickness[-2:-1]])
+            thickness = 0.5 * thickness + 0.25 * (padded[2:] + padded[:-2])
+    grid = [face]
+    growth = scene.discretisation.size_growth
+    offset = np.zeros_like(thickness)
+    on_axis = np.zeros(len(theta), bool) if ring.closed else np.isin(np.arange(len(theta)), [0, len(theta) - 1])
+    for j in range(count):
+        offset = offset + thickness * (1 + 0.5 * growth * j)
+        r = radius + (offset if outward else -offset)
+        angle = theta.copy()
+        if ring.cuts:
+            shift = {}
+            for i, height in zip(ring.cuts, heights, strict=True):
+                there = math.degrees(math.acos((height + tunnel.axis_depth) / r[i]))
+                shift[i] = (there if theta[i] < 180 else 360.0 - there) - theta[i]
+            for value in (0.0, 180.0):
+                i = int(np.argmin(np.abs(theta - value)))
+                shift.setdefault(i, 0.0)
+            for i in ring.opening[[0, -1]] if len(ring.opening) else ():
+                shift[int(i)] = 0.0
+            at = sorted(shift)
+            angle = theta + np.interp(theta, theta[at], [shift[i] for i in at], period=360.0 if ring.closed else None)
+        free_x, free_y = ~on_axis, np.ones(len(theta), bool)
+        free_y[ring.cuts] = False
+        row = outline.add(place(tunnel, r, angle), free_x, free_y)
+        for i, height in zip(ring.cuts, heights, strict=True):
+            outline.nodes[row[i], 1] = height
+        grid.append(row)
+    rows = np.stack(grid, axis=1)
+    if count:
+        outline.add_grid(np.concatenate([rows, rows[:1]]) if ring.closed else rows, SOIL if outward else INTERIOR)
+    return rows
+
+
+def _loop(ring, row):
+    """Pieces of a row of a ring between its cuts."""
+    starts = sorted(ring.cuts)
+    if not ring.closed:
+        return [row[a : b + 1] for a, b in pairwise(sorted({0, len(row) - 1, *starts}))]
+    first = starts[0] if starts else 0
+    turned = np.roll(row, -first)
+    turned = np.concatenate([turned, turned[:1]])
+    return [turned[a : b + 1] for a, b in pairwise([*(i - first for i in starts or [0]), len(row)])]
+
+
+def horizontal_lines(scene: Scene) -> list[float]:
+    """Heights [m, downward] of soil layer boundaries, and of the water table where it is a mesh line of its own.
+
+    The table is left out where it lies closer to a layer boundary, to the surface or to the bottom than `NEAR_LINE`
+    element sizes, or where it touches a tunnel near crown or invert, or beside its gate: a kink of the pore pressure
+    inside a cell does less harm than flat cells.
+    """
+    layers = [-soil.top_depth for soil in scene.soils[1:]]
+    if scene.water is None:
+        return layers
+    table, size = -scene.water.table_depth, scene.discretisation.element_size
+    if min(abs(table - y) for y in (0.0, -scene.box.depth, *layers)) < NEAR_LINE * size:
+        return layers
+    for i, tunnel in enumerate(scene.tunnels):
+        rise, radius = table + tunnel.axis_depth, tunnel.outer_radius
+        if abs(abs(rise) - radius) < max(0.35 * radius, 4 * scene.discretisation.element_size_lining):
+            return layers
+        if abs(rise) < radius and scene.gate is not None and scene.gate.tunnel == i and _meets_gate(scene, tunnel, table):
+            return layers
+    return sorted([*layers, table], reverse=True)
+
+
+def _cut_angle(tunnel, height):
+    """Angle [deg] right of the crown at which a horizontal line meets the outer face."""
+    return math.degrees(math.acos((height + tunnel.axis_depth) / tunnel.outer_radius))
+
+
+def _meets_gate(scene, tunnel, height):
+    gate = scene.gate
+    half = math.degrees(math.asin(gate.width / 2 / tunnel.outer_radius))
+    angle = _cut_angle(tunnel, height)
+    return any(abs((t - gate.angle + 180) % 360 - 180) < 1.5 * half for t in (angle, 360.0 - angle))
+
+
+def rows_that_fit(scene: Scene, i: int, lines: list[float], most: int) -> int:
+    """Rows of cells along the outer face of tunnel i that stay clear of lines, box and other tunnels."""
+    tunnel, size = scene.tunnels[i], scene.discretisation.element_size_lining
+    radius = tunnel.outer_radius
+    clear = [scene.box.width / 2 - abs(tunnel.x) - radius]
+    clear += [
+        abs(abs(y + tunnel.axis_depth) - radius)
+        for y in (0.0, -scene.box.depth, *lines)
+        if abs(y + tunnel.axis_depth) >= radius
+    ]
+    clear += [
+        math.hypot(t.x - tunnel.x, t.axis_depth - tunnel.axis_depth) - t.outer_radius - radius
+        for j, t in enumerate(scene.tunnels)
+        if j != i
+    ]
+    return max(0, min(most, int(0.4 * min(clear) / size), max(1, int(0.7 * radius / size))))
+
+
+def draw_scene(scene: Scene, rows: int) -> Outline:
+    """All lines of a scene with their nodes, and the regular cells; of a half model those of x >= 0.
+
+    Parameters
+    ----------
+    rows : int
+        Most rows of regular cells along a lining.
+
+    Raises
+    ------
+    MeshError
+        When a soil layer boundary touches the gate.
+    """
+    outline = Outline()
+    lines = horizontal_lines(scene)
+    rings, edges = [], []
+    for i, tunnel in enumerate(scene.tunnels):
+        has_gate = scene.gate is not None and scene.gate.tunnel == i
+        cut = [y for y in lines if abs(y + tunnel.axis_depth) < tunnel.outer_radius]
+        if has_gate:
+            for y in cut:
+                if _meets_gate(scene, tunnel, y):
+                    raise MeshError(
+                        "gate: must not touch a soil layer boundary on the lining, got gate angle "
+                        f"{scene.gate.angle:g} deg and a boundary at {_cut_angle(tunnel, y):.4g} deg; "
+                        "move the layer or the gate by the gate's width"
+                    )
+        cuts = [(t, y) for y in cut for t in (_cut_angle(tunnel, y), 360.0 - _cut_angle(tunnel, y))]
+        cuts = sorted((t, y) for t, y in cuts if not scene.is_half or t < 180)
+        ring = _ring(scene, tunnel, tunnel.outer_radius, [t for t, _ in cuts], has_gate)
+        face = outline.add(place(tunnel, tunnel.outer_radius, ring.theta))
+        outline.outer.append(face)
+        outline.theta.append(ring.theta)
+        count = rows_that_fit(scene, i, lines, rows)
+        grid = _rows(
+            scene, outline, tunnel, ring, face, tunnel.outer_radius, count, True, [y for _, y in cuts]
+        )  # fmt: skip
+        rings.append(ring)
+        edges.append(grid[:, -1])
+        if has_gate:
+            _draw_gate(scene, outline, tunnel, ring, rows)
+    _draw_ground(scene, outline, lines, rings, edges)
     return outline
 
 
-def _draw_channel(scene: Scene, draw: Drawing, outline: Outline, tunnel: Tunnel, n: int) -> None:
-    """Points of the channel walls and of the inner face of the gate's tunnel."""
-    gate = scene.gate
-    assert gate is not None
-    half = math.degrees(math.asin(gate.width / 2 / tunnel.inner_radius))
-    opening = [gate.angle + half * (2 * k / n - 1) for k in range(n + 1)]
-    tags = _on_ring(draw, tunnel, tunnel.inner_radius, opening)
-    outline.inner_corners = [tags[0], tags[-1]]
-    outline.inner_opening = tags[1:-1]
+def _draw_gate(scene, outline, tunnel, ring, rows):
+    """The channel, and the inside of the gate's tunnel where it is resolved."""
+    if scene.interior == "resolved":
+        inner = _ring(scene, tunnel, tunnel.inner_radius, [], True, 2 if scene.is_half else 4)
+        face = outline.add(place(tunnel, tunnel.inner_radius, inner.theta))
+    else:
+        inner = _opening_only(scene, tunnel)
+        face = outline.add(place(tunnel, tunnel.inner_radius, inner.theta))
+    mouth, throat = outline.outer[-1][ring.opening], face[inner.opening]
     length = tunnel.outer_radius - tunnel.inner_radius
     pieces = max(1, round(length / gate_size(scene)))
-    for corner, inner in zip(outline.corners, outline.inner_corners, strict=True):
-        (x0, y0), (x1, y1) = draw.exact[corner], draw.exact[inner]
-        outline.walls.append(
-            [draw.point(x0 + (x1 - x0) * k / pieces, y0 + (y1 - y0) * k / pieces) for k in range(1, pieces)]
-        )
-    if scene.interior == "resolved":
-        opposite = gate.angle + 180.0
-        theta = [
-            *_divide(scene, tunnel, tunnel.inner_radius, opening[-1], opposite),
-            opposite,
-            *_divide(scene, tunnel, tunnel.inner_radius, opposite, opening[0] + 360.0),
-        ]
-        outline.inner = _on_ring(draw, tunnel, tunnel.inner_radius, theta)
-
-
-def draw_scene(scene: Scene, gmsh: Any) -> tuple[Drawing, Outline, dict[int, int], dict[str, list[int]]]:
-    """The whole geometry; also the region of each surface and the curves of each side of the box."""
-    draw = Drawing(gmsh)
-    half, depth, top = scene.box.width / 2, scene.box.depth, headroom_height(scene)
-    outline = _draw_lining(scene, draw)
-    levels = [-soil.top_depth for soil in scene.soils] + [-depth]
-    left = [draw.point(-half, y) for y in levels]
-    right = [draw.point(half, y) for y in levels]
-    # Where a line from side to side crosses the mirror line of a half model.
-    middle = _middle_points(scene, draw, levels)
-    upper = [draw.point(x, top) for x in ((-half, 0.0, half) if scene.is_half else (-half, half))]
-    side_left, side_right = draw.chain(left), draw.chain(right[::-1])
-    bottom = draw.chain([left[-1], *middle[-1], right[-1]])
-    ground = draw.chain([right[0], *middle[0], left[0]])
-    rings = [draw.edges([*tags, tags[0]]) for tags in outline.outer]
-    soil = draw.surface([*side_left, *bottom, *side_right, *ground], *rings)
-    regions = {soil: SOIL}
-    above = draw.chain([left[0], *middle[0], right[0]]), draw.chain([right[0], *upper[::-1], left[0]])
-    headroom = draw.surface([*above[0], *above[1]])
-    regions[headroom] = HEADROOM
-    embedded = {soil: _draw_layers(scene, draw, outline, left, middle, right)}
+    share = np.arange(1, pieces) / pieces
+    columns = []
+    for a, b in zip(mouth, throat, strict=True):
+        between = outline.nodes[a] + share[:, None] * (outline.nodes[b] - outline.nodes[a])
+        columns.append(np.concatenate([[a], outline.add(between), [b]]))
+    outline.add_grid(np.stack(columns), CHANNEL)
+    ends = [0, -1]
     if scene.is_half:
-        axis = -scene.tunnels[0].axis_depth
-        above_tunnel = [tag for tags in middle for tag in tags if draw.exact[tag][1] > axis]
-        below_tunnel = [tag for tags in middle for tag in tags if draw.exact[tag][1] < axis]
-        crown = draw.on_axis([tag for tag in outline.outer[0] if draw.exact[tag][1] > axis])
-        invert = draw.on_axis([tag for tag in outline.outer[0] if draw.exact[tag][1] < axis])
-        embedded[soil] += draw.chain([*above_tunnel, crown]) + draw.chain([invert, *below_tunnel])
-        embedded[headroom] = [draw.line(middle[0][0], upper[1])]
-    if scene.gate is not None:
-        (a, b), (c, d) = outline.corners, outline.inner_corners
-        mouth = draw.edges([a, *outline.opening, b])
-        throat = draw.edges([d, *outline.inner_opening[::-1], c])
-        sides = draw.edges([b, *outline.walls[1], d]), draw.edges([c, *outline.walls[0][::-1], a])
-        channel = draw.surface([*mouth, *sides[0], *throat, *sides[1]])
-        # A regular strip: the smallest elements set the time step, and free meshing would make some of them flatter.
-        draw.geo.mesh.setTransfiniteSurface(channel, "Alternate", [a, b, d, c])
-        regions[channel] = CHANNEL
-        if scene.interior == "resolved":
-            face = draw.edges([d, *outline.inner, c])
-            interior = draw.surface([*face, *[-tag for tag in throat[::-1]]])
-            regions[interior] = INTERIOR
-            if scene.is_half:
-                # The channel needs no line: it is a strip with nodes on its axis.
-                embedded[interior] = draw.chain([draw.on_axis(outline.inner_opening), draw.on_axis(outline.inner)])
-    draw.geo.synchronize()
-    for surface, lines in embedded.items():
-        if lines:
-            gmsh.model.mesh.embed(1, lines, 2, surface)
-    sides_of_box = {
-        "left": [*side_left, above[1][-1]],
-        "right": [*side_right, above[1][0]],
-        "bottom": bottom,
-        "top": above[1][1:-1],
-    }
-    return draw, outline, regions, sides_of_box
+        ends = [-1] if scene.gate.angle == 0 else [0]
+    outline.corners = mouth[ends]
+    outline.walls = [columns[end][1:] for end in ends]
+    strict = slice(0 if scene.is_half and scene.gate.angle == 0 else 1, None if scene.is_half and scene.gate.angle == 180 else -1)
+    outline.opening, outline.inner_opening = mouth[strict], throat[strict]
+    if scene.interior != "resolved":
+        return
+    n = len(face)
+    after = (inner.opening[-1] + np.arange(1, n)) % n
+    outside = [i for i in after if i not in set(inner.opening.tolist())]
+    outline.inner = face[sorted(outside) if scene.is_half else outside]
+    size = scene.discretisation.element_size_interior
+    count = max(0, min(rows, int(0.2 * tunnel.inner_radius / size)))
+    grid = _rows(scene, outline, tunnel, inner, face, tunnel.inner_radius, count, False, [])
+    loop = _loop(inner, grid[:, -1])
+    if scene.is_half:
+        loop = [*loop, _line(scene, outline, grid[-1, -1], grid[0, -1], loop)]
+    outline.faces.append(Face(INTERIOR, [loop], []))
 
 
-def _middle_points(scene: Scene, draw: Drawing, levels: list[float]) -> list[list[int]]:
-    """Per level, the point at x = 0 of a half model; none where the tunnel interrupts the level or in a whole model."""
-    if not scene.is_half:
-        return [[] for _ in levels]
-    (tunnel,) = scene.tunnels
-    return [[draw.point(0.0, y)] if abs(y + tunnel.axis_depth) >= tunnel.outer_radius else [] for y in levels]
+def _opening_only(scene, tunnel):
+    """The inner end of the channel alone, where a sink takes what arrives."""
+    n = scene.discretisation.elements_across_gate
+    half = math.degrees(math.asin(scene.gate.width / 2 / tunnel.inner_radius))
+    theta = scene.gate.angle + half * (2 * np.arange(n + 1) / n - 1)
+    if scene.is_half:
+        theta = theta[n // 2 :] if scene.gate.angle == 0 else theta[: n // 2 + 1]
+    return _Ring(theta, False, [], np.arange(len(theta)))
 
 
-def _draw_layers(
-    scene: Scene, draw: Drawing, outline: Outline, left: list[int], middle: list[list[int]], right: list[int]
-) -> list[int]:
-    """Lines of the soil layer boundaries, interrupted by tunnels and by the mirror line of a half model."""
-    result = []
-    for k, soil in enumerate(scene.soils[1:], start=1):
-        crossings = []
-        for tunnel, tags in zip(scene.tunnels, outline.outer, strict=True):
-            if abs(-soil.top_depth + tunnel.axis_depth) < tunnel.outer_radius:
-                by_height = sorted(tags, key=lambda tag: abs(draw.exact[tag][1] + soil.top_depth))[:2]
-                crossings.append(sorted(by_height, key=lambda tag: draw.exact[tag][0]))
-        crossings.sort(key=lambda pair: draw.exact[pair[0]][0])
-        crossings += [2 * middle[k]] if middle[k] else []
-        chain = [left[k], *[tag for pair in crossings for tag in pair], right[k]]
-        result += [draw.line(a, b) for a, b in zip(chain[::2], chain[1::2], strict=True)]
-    return result
+def _draw_ground(scene, outline, lines, rings, edges):
+    """Sides of the box, horizontal lines between them, and the ground that is left beside the rings."""
+    half, depth = scene.box.width / 2, scene.box.depth
+    levels = [0.0, *lines, -depth]
+    right = outline.add([(half, y) for y in levels])
+    if scene.is_half:
+        (tunnel,), (edge,), (ring,) = scene.tunnels, edges, rings
+        radius = tunnel.outer_radius
+        left = [int(outline.add((0.0, y))[0]) if abs(y + tunnel.axis_depth) > radius else -1 for y in levels]
+        above = [k for k, y in zip(left, levels, strict=True) if y + tunnel.axis_depth > radius]
+        below = [k for k, y in zip(left, levels, strict=True) if y + tunnel.axis_depth < -radius]
+        axis = [
+            [_line(scene, outline, a, b) for a, b in pairwise([*above, edge[0]])],
+            _loop(ring, edge),
+            [_line(scene, outline, a, b) for a, b in pairwise([edge[-1], *below])],
+        ]
+        side_left = [piece for part in axis for piece in part]
+    else:
+        left = outline.add([(-half, y) for y in levels]).tolist()
+        side_left = [_line(scene, outline, a, b) for a, b in pairwise(left)]
+    side_right = [_line(scene, outline, a, b) for a, b in pairwise(right)]
+    outline.ground = _line(scene, outline, left[0], right[0])
+    holes = [] if scene.is_half else [_loop(ring, edge) for ring, edge in zip(rings, edges, strict=True)]
+    beside = [*side_left, *side_right, outline.ground, *[piece for hole in holes for piece in hole]]
+    bottom = _line(scene, outline, left[-1], right[-1], beside)
+    loop = [*side_left, bottom, *[piece[::-1] for piece in side_right[::-1]], outline.ground[::-1]]
+    inside = []
+    for k, y in enumerate(lines, start=1):
+        met = []
+        for tunnel, ring, edge in zip(scene.tunnels, rings, edges, strict=True):
+            at = [edge[i] for i in ring.cuts if abs(outline.nodes[edge[i], 1] - y) < 1e-12]
+            met += at
+        met.sort(key=lambda node: outline.nodes[node, 0])
+        ends = [*([left[k]] if left[k] >= 0 else []), *met, right[k]]
+        inside += [_line(scene, outline, a, b) for a, b in zip(ends[::2], ends[1::2], strict=True)]
+    outline.faces.append(Face(SOIL, [loop, *holes], inside))
+
+
+def draw_headroom(scene: Scene, outline: Outline) -> None:
+    """Regular columns of empty cells above the ground surface, whose nodes do not move any more."""
+    height = headroom_height(scene)
+    pieces = max(1, round(height / scene.discretisation.element_size))
+    rows = [outline.ground]
+    for k in range(1, pieces + 1):
+        row = outline.nodes[outline.ground].copy()
+        row[:, 1] = height * k / pieces if k < pieces else height
+        rows.append(outline.add(row))
+    outline.add_grid(np.stack(rows), HEADROOM)
+
+
+__all__: Sequence[str] = ("Face", "Outline", "draw_headroom", "draw_scene", "horizontal_lines", "place")
