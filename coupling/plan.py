@@ -168,21 +168,9 @@ def features(scene, threads):
         ),
         ("tunnel interior", resolved, inside),
         (
-            "volumetric smoothing",
-            numerics.volumetric_smoothing,
-            "against locking of linear triangles" if numerics.volumetric_smoothing else "switched off in [numerics]",
-        ),
-        (
-            "velocities mapped anew for the strains",
-            numerics.remapping,
-            "MUSL: a node that a point hardly touches does not strain"
-            if numerics.remapping
-            else "remapping = false in [numerics] (USL): a shorter critical step",
-        ),
-        (
             "pressure filter",
             numerics.pressure_filter > 0 and s.water is not None,
-            f"{numerics.pressure_filter:g} of what is not smooth, a step" if numerics.pressure_filter else "set to 0",
+            f"{numerics.pressure_filter:g} of what no node feels, a step" if numerics.pressure_filter else "set to 0",
         ),
         ("motion of the lining", any(s.lining_of(t) != "fixed" for t in s.tunnels), _linings(s)),
         ("the half x < 0", not s.is_half, _why_half(s)),

@@ -26,20 +26,22 @@ class Clock(NamedTuple):
     begun: np.ndarray  # (most substeps,) the coarsest level that begins a step in each substep
     finished: np.ndarray  # (most substeps,) and that ends one
     finest_around: np.ndarray  # (n_elements,) int8, finest level at the nodes of an element
-    ahead: np.ndarray  # (n_elements,) see `mpm.levels.Levels.ahead`
+    ahead: np.ndarray  # (n_elements,) `damping`, and what `mpm.levels.Levels.ahead` adds where levels meet
+    damping: float  # see `mpm.scene.Numerics.stress_damping`
 
     @classmethod
-    def of(cls, levels):
+    def of(cls, levels, damping):
         """A clock that stands still.
 
         Parameters
         ----------
         levels : mpm.levels.Levels
+        damping : float
         """
         n, most = levels.count, 2 ** (MOST_LEVELS - 1)
         return cls(
             np.zeros(5), np.ones(n, np.int64), *np.zeros((3, n)), *np.zeros((2, most), np.int64),
-            levels.finest_around, np.zeros(len(levels.of_element)),
+            levels.finest_around, np.full(len(levels.of_element), damping), damping,
         )  # fmt: skip
 
     @property
@@ -168,7 +170,7 @@ def plan_step(clock, pace, limits, start, occupied, n_occupied, element_cuts, le
     if changed:
         for e in range(clock.ahead.size):
             share = periods[clock.finest_around[e]] / periods[level_of_element[e]]
-            clock.ahead[e] = 0.5 * (1.0 - share)
+            clock.ahead[e] = clock.damping + 0.5 * (1.0 - share)
     for k in range(count):
         clock.begun[k] = clock.finished[k] = -1
         for level in range(levels):

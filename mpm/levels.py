@@ -64,10 +64,12 @@ class Levels:
         """Number of levels."""
         return len(self.element_cuts) - 1
 
-    @cached_property
-    def stiffened(self):
-        """Factor by which its own step makes an element stiffer for a spectrum in steps of level 0: (n_elements,)."""
-        return 4.0**self.of_element * (1 + 2 * self.ahead(2 ** np.arange(self.count)))
+    def stiffened(self, damping):
+        """Factor by which its own step makes an element stiffer for a spectrum in steps of level 0: (n_elements,).
+
+        damping : how far all stress runs ahead, in steps of its element [-].
+        """
+        return 4.0**self.of_element * (1 + 2 * (damping + self.ahead(2 ** np.arange(self.count))))
 
     @cached_property
     def finest_around(self):
@@ -109,7 +111,7 @@ def element_levels(elements, n_nodes, altitude, weight):
     best, least = np.zeros(len(elements), np.int8), float(weight.sum())
     for offset in OFFSETS[::-1]:
         own = np.floor(np.log2(altitude / (offset * altitude.min())) + 1e-9).astype(np.int8)
-        level = _without_islands(_widened(np.minimum(own, MOST_LEVELS - 1), elements, n_nodes), elements, n_nodes)
+        level = _of_cells(_widened(np.minimum(own, MOST_LEVELS - 1), elements, n_nodes))
         work = float((weight / 2.0**level).sum()) / offset
         if work < 0.999 * least:
             best, least = level, work
@@ -127,13 +129,9 @@ def _widened(level, elements, n_nodes):
     return _finest_at_nodes(level, elements, n_nodes)[elements].min(axis=1)
 
 
-def _without_islands(level, elements, n_nodes):
-    """Lower elements none of whose nodes lies within their own level: alone they would not share volume changes."""
-    while True:
-        lower = np.minimum(level, _finest_at_nodes(level, elements, n_nodes)[elements].max(axis=1))
-        if np.array_equal(lower, level):
-            return level
-        level = lower
+def _of_cells(level):
+    """Give the four elements of a quadrilateral their finest level: they share what they know of the pore pressure."""
+    return np.repeat(level.reshape(-1, 4).min(axis=1), 4)
 
 
 def sorted_by_level(mesh, level):

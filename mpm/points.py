@@ -548,9 +548,7 @@ def locate_kernel(wet, undrained, tied):
             element_of_point[i] = e
             if e >= 0:
                 fastest = np.sqrt(
-                    map_point(
-                        points[i], soils[soil_of_point[i]], density_liquid, rows[e], geometry[e], touched, sums
-                    )
+                    map_point(points[i], soils[soil_of_point[i]], density_liquid, rows[e], geometry[e], touched, sums)
                 )
                 local = geometry[e, 7] / ((wave_speed + fastest) * (1 << level_of_element[e]))
                 if local < limit:

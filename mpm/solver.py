@@ -141,7 +141,7 @@ class Solver(Measures):
         self.tied_means = np.zeros((n_rows - n, 6))
         self.status = np.zeros(n, np.int8)
         self.contents = np.zeros((m, ELEMENT_CONTENTS))
-        self.clock = Clock.of(self.levels)
+        self.clock = Clock.of(self.levels, float(scene.numerics.stress_damping))
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
         self.threads = 1 if m < SMALLEST_PARALLEL else max(1, min(threads or cores, PARTS))
         self.workers = Threads(self.threads, PARTS + 1)

@@ -5,8 +5,9 @@ that, for every mode with stiffness k, mass m and drag c (implicit), z obeys (m 
     (m + dt c) z^2 - (2 m + dt c - dt^2 k) z + m = 0,
 whose roots leave the unit circle at z = -1, that is where dt^2 k = 4 m + 2 dt c. So the critical step is
 dt = 2 / sqrt(lambda) with the largest eigenvalue lambda of the stiffness over the mass plus dt/2 times the drag.
-The stiffness holds what the kernels hold: element strains, pore water; the mass is that of the nodes, twice, with the points between (velocities return to the nodes through them, MUSL), which takes the shortest
-waves of consistent-mass kind away. Altitude over wave speed knows none of this.
+The stiffness holds what the kernels hold: element strains, pore water; the mass is that of the nodes, twice, with the
+points between (velocities return to the nodes through them, MUSL), which takes the shortest waves of consistent-mass
+kind away. Altitude over wave speed knows none of this.
 
 With local time stepping the step of level 0 is sought for which the same holds when the stiffness of every element is
 multiplied by the square of its own step over that of level 0, and the drag of a node by the step of its finest level.
@@ -344,7 +345,7 @@ class Spectrum:
         self.operator = Operator(
             elements=mesh.elements,
             geometry=solver.geometry,
-            stiffened=levels.stiffened,
+            stiffened=levels.stiffened(solver.scene.numerics.stress_damping),
             fixed=solver.fixed,
             step_of_node=2.0 ** levels.of_row[:n_nodes],
             undrained=solver.scene.is_undrained,

@@ -77,9 +77,6 @@ from mpm.variables import (
 )
 
 AHEAD = 16  # points whose rows are on the way into the cache: their order is known, the machine does not guess it
-import os
-OWN = float(os.environ.get("QOWN", "1"))
-FULL = float(os.environ.get("QFULL", "0.9"))
 
 
 @inline_kernel
@@ -315,7 +312,7 @@ def force_kernel(wet):
 
     @inline_kernel
     def add_forces(g1x, g1y, g2x, g2y, fxx, fyy, fxy, fp, a, b, c, sums):
-        """Add the forces of total stress times volume, and of pressure times volume [N m/m], to three rows, in place."""
+        """Add the forces of total stress, and of pore pressure, times volume [N m/m] to three rows, in place."""
         g0x, g0y = -g1x - g2x, -g1y - g2y
         sums[a, B_FX] -= g0x * fxx + g0y * fxy
         sums[a, B_FY] -= g0x * fxy + g0y * fyy
@@ -368,7 +365,8 @@ def update_kernel(wet, undrained, plastic, tied):
             Material volume [m2], and times it pore pressure and position, summed over the points; read of the last and
             written for the next step.
         ahead : (n_elements,) float64
-            How far the stress that acts on the nodes runs ahead of that of the points, in steps of the element.
+            How far the stress that acts on the nodes runs ahead of that of the points, in steps of the element. Held
+            back, a spring feeds motion (`mpm.levels`); ahead, it damps it: a Kelvin-Voigt viscosity of that time.
         element_of_point : (n_points,) int32
             Written: -2 - element for a point that left its element.
         touched : (n_rows,) uint8
@@ -399,7 +397,7 @@ def update_kernel(wet, undrained, plastic, tied):
             dt = dt_of_level[level_of_element[e]]
             a, b, c = index(rows[e, 0]), index(rows[e, 1]), index(rows[e, 2])
             touched[a] = touched[b] = touched[c] = 1
-            fxx = fxy = fyy = fp = ahead_pressure = total = held_x = held_y = fastest = 0.0
+            fxx = fxy = fyy = fp = bxx = bxy = byy = bp = total = held_x = held_y = fastest = 0.0
             rate_xx, rate_yy, xy, yx = gradients(
                 g1x, g1y, g2x, g2y, nodes[a, V_SX], nodes[a, V_SY], nodes[b, V_SX], nodes[b, V_SY], nodes[c, V_SX],
                 nodes[c, V_SY],
@@ -413,44 +411,18 @@ def update_kernel(wet, undrained, plastic, tied):
                     nodes[c, V_LY],
                 )  # fmt: skip
                 expansion_liquid = dt * (liquid_xx + liquid_yy)
-            if OWN < 1.0:
-                q = e & ~index(3)
-                held = contents[q, E_VOLUME] + contents[q + index(1), E_VOLUME]
-                held += contents[q + index(2), E_VOLUME] + contents[q + index(3), E_VOLUME]
-                room = geometry[q, 6] + geometry[q + index(1), 6] + geometry[q + index(2), 6] + geometry[q + index(3), 6]
-                if held >= FULL * room:
-                    qa, qb, qc, qd = index(rows[q, 0]), index(rows[q + index(1), 0]), index(rows[q + index(2), 0]), index(rows[q + index(3), 0])
-                    xac, yac = geometry[q, 4] - geometry[q + index(2), 4], geometry[q, 5] - geometry[q + index(2), 5]
-                    xbd, ybd = geometry[q + index(1), 4] - geometry[q + index(3), 4], geometry[q + index(1), 5] - geometry[q + index(3), 5]
-                    factor = dt * (1.0 - OWN) / (xac * ybd - xbd * yac)
-                    mean = factor * (
-                        (nodes[qa, V_SX] - nodes[qc, V_SX]) * ybd - (nodes[qb, V_SX] - nodes[qd, V_SX]) * yac
-                        - (nodes[qa, V_SY] - nodes[qc, V_SY]) * xbd + (nodes[qb, V_SY] - nodes[qd, V_SY]) * xac
-                    )
-                    correction = 0.5 * (mean - (1.0 - OWN) * expansion)
-                    exx += correction
-                    eyy += correction
-                    expansion = exx + eyy
-                    if two_phase:
-                        mean = factor * (
-                            (nodes[qa, V_LX] - nodes[qc, V_LX]) * ybd - (nodes[qb, V_LX] - nodes[qd, V_LX]) * yac
-                            - (nodes[qa, V_LY] - nodes[qc, V_LY]) * xbd + (nodes[qb, V_LY] - nodes[qd, V_LY]) * xac
-                        )
-                        expansion_liquid = OWN * expansion_liquid + mean
-                    else:
-                        expansion_liquid = expansion
             mean = expansion * third
             equivalent = np.sqrt(2.0 * third * ((exx - mean) ** 2 + (eyy - mean) ** 2 + mean * mean + 2.0 * exy * exy))
             full = contents[e, E_VOLUME] >= geometry[e, 6]
-            border = tied and ahead[e] > 0.0
+            runs_ahead = advance and ahead[e] > 0.0
             cxx = cyy = cxy = cp = 0.0
             for j in range(start[e], start[e + 1]):
                 i = index(order[j])
                 prefetch(points, index(order[min(j + AHEAD, order.size - 1)]))
                 s = index(soil_of_point[i])
-                if border:
-                    before = max(points[i, P], 0.0) if wet else 0.0
-                    cxx, cyy, cxy, cp = points[i, SXX] - before, points[i, SYY] - before, points[i, SXY], before
+                if runs_ahead:
+                    cp = max(points[i, P], 0.0) if wet else 0.0
+                    cxx, cyy, cxy = points[i, SXX] - cp, points[i, SYY] - cp, points[i, SXY]
                 if advance:
                     n = points[i, N]
                     p = points[i, P]
@@ -527,13 +499,11 @@ def update_kernel(wet, undrained, plastic, tied):
                 fyy += v * (points[i, SYY] - p)
                 fxy += v * points[i, SXY]
                 total += v
-                if border:
-                    more = ahead[e] * v
-                    fxx += more * (points[i, SXX] - p - cxx)
-                    fyy += more * (points[i, SYY] - p - cyy)
-                    fxy += more * (points[i, SXY] - cxy)
-                    if wet:
-                        ahead_pressure += more * (p - cp)
+                if runs_ahead:
+                    bxx += v * cxx
+                    byy += v * cyy
+                    bxy += v * cxy
+                    bp += v * cp
             contents[e, E_VOLUME] = total
             if wet:
                 contents[e, E_PRESSURE], contents[e, E_X], contents[e, E_Y] = fp, held_x, held_y
@@ -542,7 +512,12 @@ def update_kernel(wet, undrained, plastic, tied):
             if local < limit:
                 limit = local
                 limit_speed = fastest
-            add_forces(g1x, g1y, g2x, g2y, fxx, fyy, fxy, fp + ahead_pressure, a, b, c, sums)
+            if runs_ahead:
+                fxx += ahead[e] * (fxx - bxx)
+                fyy += ahead[e] * (fyy - byy)
+                fxy += ahead[e] * (fxy - bxy)
+                fp += ahead[e] * (fp - bp)
+            add_forces(g1x, g1y, g2x, g2y, fxx, fyy, fxy, fp, a, b, c, sums)
         clamps[C_SUSPENDED] += n_suspended
         clamps[C_CAVITATED] += n_cavitated
         clamps[C_FLOOR] += n_floor

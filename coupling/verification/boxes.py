@@ -69,7 +69,7 @@ def box_mesh(x, y, filled=None, fixed_bottom=True):
 
 
 def annulus_mesh(radii, sectors):
-    """Crossed quadrilaterals on a quarter annulus about the origin, y downward from 0, all filled; smooth on its two axes.
+    """Crossed quadrilaterals on a quarter annulus about the origin, y downward from 0, all filled; smooth on its axes.
 
     Parameters
     ----------

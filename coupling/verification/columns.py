@@ -59,7 +59,8 @@ def terzaghi(
     """
     height, initial = 1.0, 1e4
     scene, mesh = column(
-        cells, height, conductivity, bulk_modulus, model=model, points=points, courant=courant, pic_rate=pic_rate, pressure_filter=pressure_filter, drainage=drainage,
+        cells, height, conductivity, bulk_modulus, model=model, points=points, courant=courant, pic_rate=pic_rate,
+        pressure_filter=pressure_filter, drainage=drainage,
     )  # fmt: skip
     solver = Solver(scene, mesh, threads=1)
     hydrostatic = solver.points[:, P].copy()
@@ -67,7 +68,6 @@ def terzaghi(
     solver.points[:, SYY] += initial  # total stress unchanged: the load is carried by the water
     solver.points[:, SXX] += NU / (1 - NU) * initial
     solver.points[:, SZZ] += NU / (1 - NU) * initial
-    still = np.maximum(-mesh.nodes[:, 1], 0.0) * 1000.0 * 9.81
     storage = 1 / constrained_modulus() + POROSITY / bulk_modulus
     end = time_factor * height**2 * 1000 * 9.81 * storage / conductivity
     longest = 0.0

@@ -20,7 +20,8 @@ def collapse(
     what gravity gives. Suspended, splashing material is the worst case for the water.
     """
     scene, _ = column(
-        cells, 1.0, conductivity, 8e7, model="mohr-coulomb", points=points, courant=courant, pic_rate=pic_rate, pressure_filter=pressure_filter,
+        cells, 1.0, conductivity, 8e7, model="mohr-coulomb", points=points, courant=courant, pic_rate=pic_rate,
+        pressure_filter=pressure_filter,
     )  # fmt: skip
     size = 1.0 / cells
     soil = scene.soils[0].model_copy(update={"cohesion": 0.0, "tensile_strength": 0.0})

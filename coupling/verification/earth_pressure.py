@@ -132,7 +132,8 @@ def footing(
 
 
 WALL_LADDER = {
-    "cells": (5, 10, 20), "courant": (0.4, 0.8, 1.0), "points": (1, 3, 12), "pic_rate": (0.0, 10.0, 100.0), "friction_angle": (20.0, 30.0, 40.0),
+    "cells": (5, 10, 20), "courant": (0.4, 0.8, 1.0), "points": (1, 3, 12), "pic_rate": (0.0, 10.0, 100.0),
+    "friction_angle": (20.0, 30.0, 40.0),
     "dilatancy_angle": (0.0, 10.0, 30.0),
     "cohesion": (0.0, 2e3), "rough_base": (False, True),
 }  # fmt: skip
@@ -157,7 +158,8 @@ register(Problem(
     source="Prandtl (1920): N_c = 2 + pi", norm="N_c over 2 + pi less 1, mean over the last fifth of the path",
     solve=footing, fast={"cells": 8},
     ladder={
-        "cells": (2, 4, 8, 16), "courant": (0.4, 0.8, 1.0), "points": (1, 3, 12), "pic_rate": (0.0, 10.0, 100.0), "rough": (False, True),
+        "cells": (2, 4, 8, 16), "courant": (0.4, 0.8, 1.0), "points": (1, 3, 12), "pic_rate": (0.0, 10.0, 100.0),
+        "rough": (False, True),
         "friction_angle": (0.0, 10.0, 20.0), "stiffness": (10000.0, 20000.0, 40000.0),
     },
     limit=0.05,

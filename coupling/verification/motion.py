@@ -20,7 +20,8 @@ def free_fall(
     Reference: x0 + v t - g t^2 / 2, and no stress at all.
     """
     scene, _ = column(
-        cells, 1.0, 1e-4, 8e7, model="mohr-coulomb", points=points, courant=courant, pic_rate=pic_rate, pressure_filter=pressure_filter,
+        cells, 1.0, 1e-4, 8e7, model="mohr-coulomb", points=points, courant=courant, pic_rate=pic_rate,
+        pressure_filter=pressure_filter,
     )  # fmt: skip
     size = 1.0 / cells
     x, y = np.arange(-cells, 4 * cells + 1) * size, np.arange(-3 * cells, 3 * cells + 1) * size

@@ -17,7 +17,8 @@ HEIGHT = 10.0  # [m]
 
 
 def two_phase_wave(
-    cells=20, conductivity=1.0, bulk_modulus=8e7, mode="fast", periods=2.0, points=3, courant=0.8, pic_rate=0.0, pressure_filter=0.4, drainage="two-phase",
+    cells=20, conductivity=1.0, bulk_modulus=8e7, mode="fast", periods=2.0, points=3, courant=0.8, pic_rate=0.0,
+    pressure_filter=0.4, drainage="two-phase",
 ):  # fmt: skip
     """Quarter of a standing wave in a column of 10 m, fixed at the bottom, free at the top, under its own weight.
 
@@ -25,7 +26,8 @@ def two_phase_wave(
     "together" of the fast one. The amplitude is so small that no pressure becomes negative near the free surface.
     """
     scene, mesh = column(
-        cells, HEIGHT, conductivity, bulk_modulus, YOUNG, points=points, courant=courant, pic_rate=pic_rate, pressure_filter=pressure_filter, drainage=drainage,
+        cells, HEIGHT, conductivity, bulk_modulus, YOUNG, points=points, courant=courant, pic_rate=pic_rate,
+        pressure_filter=pressure_filter, drainage=drainage,
     )  # fmt: skip
     solver = Solver(scene, mesh, threads=1)
     speeds, shapes = modes(bulk_modulus)
