@@ -179,30 +179,38 @@ def respond_command(
     limits: Annotated[
         Path | None, typer.Option(help="TOML file of structure.Limits: checks the response and draws its utilisations.")
     ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="File for the response; when left out RUN itself, beside it where RUN is none.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file of an earlier response.")] = False,
     json_path: JsonPath = None,
 ):
     """Compute the ring's response to the pressures of a run, and store it with them as /structure/BACKEND.
 
-    JSON: keys of `coupling.summary.summarise_response`, and `run`, `backend`; with --limits `utilisations` (largest of
-    every check, 1 is its limit) and `figure` (path).
+    The response of another ring (--scene), or to pressures that are no run, goes into a file of its own beside them:
+    FILE-BACKEND.nc.
+
+    JSON: keys of `coupling.summary.summarise_response`, and `run`, `backend`, `file` (path of the response); with
+    --limits `utilisations` (largest of every check, 1 is its limit) and `figure` (path).
     """
     with failures(), checked_json(json_path):
         from coupling.checked_response import draw_checks, read_limits, with_checks
-        from coupling.datasets import write_response
         from coupling.pressure_source import read_source
         from coupling.run import respond_by_name
+        from coupling.stored_response import chosen_file, store_response
         from coupling.summary import summarise_response
 
         source = read_source(run, scene)
         given = None if limits is None else read_limits(limits)
-        response = respond_by_name(source.ring, source.pressures, backend)
         name = backend.rpartition(":")[2]
+        target = chosen_file(source, name, out, overwrite)
+        response = respond_by_name(source.ring, source.pressures, backend)
         data = {"run": str(run), "backend": name, **summarise_response(response)}
         if given is not None:
             response, data["utilisations"] = with_checks(response, given)
-        write_response(source.file, response, name)
+        data["file"] = str(store_response(response, source, name, target))
         if given is not None:
-            data["figure"] = draw_checks(response, source.file, name)
+            data["figure"] = draw_checks(response, source.file, name, target)
         write_json(json_path, data)
         if str(json_path) != "-":
             console = Console()
@@ -213,6 +221,7 @@ def respond_command(
                 )
                 console.print(f"largest of its limit: {shares}", highlight=False)
                 console.print(f"picture in {data['figure']}", highlight=False, soft_wrap=True)
+            console.print(f"response in {data['file']}", highlight=False, soft_wrap=True)
 
 
 @app.command("compare")
@@ -232,7 +241,8 @@ def compare_command(
 ):
     """Compare two lining models over the whole event: largest differences with place, time and cause; figures.
 
-    JSON: `run`, `models`, `cpu_seconds`, `rows` (see `coupling.compare.compare`), `differences`, `figures` (paths).
+    Nothing in RUN changes. JSON: `run`, `models`, `cpu_seconds`, `rows` (see `coupling.compare.compare`),
+    `differences`, `responses`, `figures` (paths).
     """
     with failures(), checked_json(json_path):
         from coupling.compare import compare, store

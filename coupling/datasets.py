@@ -484,6 +484,14 @@ def _group_names(file):
         return names + [f"{name}/{model}" for name in answered for model in content[name].groups]
 
 
+def stored_title(path):
+    """Title of a netCDF-4 file, by which its kind is known; empty where there is no such file or it has none."""
+    try:
+        return str(_read(Path(path), None).attrs.get("title", ""))
+    except RunFileError:
+        return ""
+
+
 def read_attributes(path):
     """Root attributes of a run: provenance, scene text, status."""
     return dict(_read(run_file(path), None).attrs)

@@ -11,12 +11,12 @@ from coupling.datasets import RunFileError, read_group, run_file
 class Source(NamedTuple):
     """Pressures of one tunnel and the ring they act on.
 
-    file : path;  is_run : whether the pressures come from the group /lining of a run;
-    pressures : xarray.Dataset (time, theta) [Pa];  ring : structure.Ring.
+    file : path;  is_own : whether they are the group /lining of a run and the ring is that run's own, so that the
+    response belongs into the run;  pressures : xarray.Dataset (time, theta) [Pa];  ring : structure.Ring.
     """
 
     file: Path
-    is_run: bool
+    is_own: bool
     pressures: object
     ring: object
 
@@ -43,18 +43,22 @@ def read_source(path, scene=None):
     coupling.scene.SceneError
         No such scene.
     """
-    from coupling.scene import load_scene, parse_scene
+    from coupling.scene import SceneError, load_scene, parse_scene
     from structure.lining import check_pressures
 
     file = run_file(path)
     root = read_group(file, None)
     is_run = _has_lining(file)
     pressures = read_group(file, "lining") if is_run else root
-    chosen = None
+    chosen = own = None
+    if "scene" in root.attrs:
+        try:
+            own = chosen = parse_scene(root.attrs["scene"], str(file))
+        except SceneError:  # of another version
+            if scene is None:
+                raise
     if scene is not None:
         chosen = load_scene(scene)
-    elif "scene" in root.attrs:
-        chosen = parse_scene(root.attrs["scene"], str(file))
     if "tunnel" in pressures.dims:
         gate = chosen.mpm.gate if chosen is not None else None
         pressures = pressures.isel(tunnel=gate.tunnel if gate else 0, drop=True)
@@ -62,7 +66,8 @@ def read_source(path, scene=None):
         check_pressures(pressures)
     except ValueError as problem:
         raise RunFileError(f"'{file}': {problem}") from problem
-    return Source(file, is_run, pressures, _ring(file, root, chosen))
+    ring = _ring(file, root, chosen)
+    return Source(file, is_run and own is not None and own.ring == ring, pressures, ring)
 
 
 def _has_lining(file):
