@@ -33,6 +33,10 @@ SOURCE = "Folder or run.nc of a run, or a netCDF-4 file with pressures that foll
 RingScene = Annotated[
     str | None, typer.Option("--scene", help="Scene whose ring is taken; that of the run when left out.")
 ]
+Changes = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="Change one value of the scene: gate.angle=45, 'gate.width=20 cm'; may be repeated."),
+]
 Threads = Annotated[int | None, typer.Option(min=1, help="Threads; all cores when left out. Does not change results.")]
 
 
@@ -58,6 +62,7 @@ def run_command(
     scene: Annotated[
         str | None, typer.Argument(help="A built-in scene (see `gush scenes`) or a TOML file; quick when left out.")
     ] = None,
+    changes: Changes = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the run; runs/SCENE, numbered, when left out.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")] = False,
     resume: Annotated[
@@ -83,11 +88,13 @@ def run_command(
         from coupling.datasets import RunFileError, read_response
         from coupling.quality import quality_line
         from coupling.run import run
-        from coupling.run_folder import FIGURES
-        from coupling.scene import load_scene
+        from coupling.run_folder import FIGURES, RunRefused
+        from coupling.scene import load_scene, parse_changes
         from coupling.summary import summarise_response, summarise_run
 
-        loaded = None if resume and scene is None else load_scene(scene or "quick")
+        if resume and scene is None and changes:
+            raise RunRefused("--set: changes a scene, got --resume without one; name the scene or leave --set out")
+        loaded = None if resume and scene is None else load_scene(scene or "quick", **parse_changes(changes or []))
         with ProgressLine(quiet) as line:
             pressures = run(
                 loaded, out, overwrite, stream.following(line), threads, not no_figures, resume, checkpoint_interval,
@@ -144,6 +151,7 @@ def rerun_command(
 @app.command("plan")
 def plan_command(
     scene: SceneName,
+    changes: Changes = None,
     threads: Threads = None,
     rough: Annotated[bool, typer.Option("--rough", help="From formulas alone, without building the mesh.")] = False,
     json_path: JsonPath = None,
@@ -155,9 +163,9 @@ def plan_command(
     with failures(), checked_json(json_path):
         from coupling.plan import plan, rough_plan
         from coupling.plausibility import warnings_of
-        from coupling.scene import load_scene
+        from coupling.scene import load_scene, parse_changes
 
-        loaded = load_scene(scene)
+        loaded = load_scene(scene, **parse_changes(changes or []))
         warnings = warnings_of(loaded)
         for warning in warnings:
             warn(warning)
