@@ -17,10 +17,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError, model_validator
 
 from coupling.plausibility import hints, shown
-from coupling.ring_units import ring_in_si
+from coupling.ring_units import ring_in_si, ring_number
 from coupling.scene_lines import entry_at, holds, line_of, path_of
 from mpm.scene import Scene as MpmScene
 from structure.ring import Ring
@@ -290,6 +290,32 @@ def nested(name: str, value: Any) -> dict[str, Any]:
     """
     for part in reversed(name.split(".")):
         value = {part: value}
+    return value
+
+
+def number_in_unit(name: str, value: Any) -> Any:
+    """A string with a unit as the number that the key of that dotted name takes; anything else as it is.
+
+    Raises
+    ------
+    ValueError
+        As :func:`mpm.scene.quantity_in`.
+    """
+    parts = [part for part in name.split(".") if not part.isdecimal()]
+    try:
+        if parts[0] == "ring":
+            return ring_number(tuple(parts), value)
+        model = MpmScene
+        for part in parts[:-1]:
+            model = next(_models_in(model.model_fields[part].annotation))
+        field = model.model_fields[parts[-1]]
+    except (KeyError, StopIteration):
+        return value  # no such key: the scene says so
+    kinds = (field, *getattr(field.annotation, "__args__", ()))
+    metadata = [each for kind in kinds for each in getattr(kind, "metadata", getattr(kind, "__metadata__", ()))]
+    for validator in metadata:
+        if isinstance(validator, BeforeValidator):
+            return validator.func(value)
     return value
 
 

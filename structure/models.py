@@ -67,6 +67,11 @@ def lining_model(name: str) -> type[LiningModel]:
     raise ValueError(f"lining model {name!r}: unknown; {hint}known: {', '.join(lining_model_names())}")
 
 
+def model_name(name: str) -> str:
+    """Name under which a model's responses are kept: of "FILE.py:CLASS" the class."""
+    return name.rpartition(":")[2]
+
+
 def _installed():
     from importlib.metadata import entry_points
 

@@ -18,7 +18,7 @@ from coupling.report.study_series import (
 from coupling.run_folder import LOG_FILE, REPORT_FILE
 from coupling.studies.case import RUN_FOLDER
 from coupling.studies.collect import stored_cases, unreadable
-from coupling.studies.design import Range, StudyError
+from coupling.studies.design import Range, StudyError, value_text
 from coupling.studies.execute import case_file
 
 SCRIPTS = (
@@ -123,7 +123,7 @@ def _row(case, dataset, extremes, failure, folder, beside):
         status, message = "failed", failure or "no reason was given"
     return {
         "number": case.index,
-        "label": label(case.parameters),
+        "label": case.name,
         "parameters": case.parameters,
         "status": status,
         "message": message,
@@ -136,23 +136,6 @@ def _row(case, dataset, extremes, failure, folder, beside):
         "report": _relative(run / REPORT_FILE, beside) if (run / REPORT_FILE).is_file() else None,
         "log": _relative(run / LOG_FILE, beside) if (run / LOG_FILE).is_file() else None,
     }
-
-
-def label(parameters):
-    """The parameters of a case in a few words."""
-    names = short_names(parameters)
-    return ", ".join(f"{name} {value_text(value)}" for name, value in zip(names, parameters.values(), strict=True))
-
-
-def short_names(parameters):
-    """Names of parameters without their table, where they stay different."""
-    short = [name.rpartition(".")[2] for name in parameters]
-    return short if len(set(short)) == len(short) else list(parameters)
-
-
-def value_text(value):
-    """A parameter's value as text."""
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _relative(path, beside):

@@ -19,7 +19,8 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     -------
     xarray.Dataset
         Variables of :func:`coupling.studies.case.at_inflow_masses` with `case` in front; parameters as coordinates
-        (case) under their dotted names with `_` for `.`; `status` (case) "finished" or "failed", `message` (case);
+        (case) in SI under their dotted names with `_` for `.`, and `case_name`; `status` (case) "finished" or
+        "failed", `message` (case);
         failed cases are NaN. Attributes: `study`, its definition as JSON with the seed; `failed`, their number; source,
         revision, versions.
 
@@ -49,8 +50,10 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     else:
         result = xr.Dataset(coords={"case": [case.index for case in cases]})
     result["case"].attrs = {"units": "1", "long_name": "number of the case"}
+    names = np.array([case.name for case in cases], dtype=str)
+    result = result.assign_coords(case_name=("case", names, {"long_name": "what the case changes"}))
     for name in plan.parameters:
-        values = np.array([case.parameters[name] for case in cases])
+        values = _column([case.parameters[name] for case in cases])
         result = result.assign_coords({name.replace(".", "_"): ("case", values, {"long_name": name})})
     if "scene" in plan.parameters:
         result = result.assign_coords(_of_scenes(cases))
@@ -66,6 +69,16 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
         "failed": int((~done).sum()),
     }
     return result
+
+
+def _column(values):
+    """Values of a parameter as an array of numbers, of truth values, or of texts."""
+    there = [value for value in values if value is not None]
+    if there and all(isinstance(value, int | float) and not isinstance(value, bool) for value in there):
+        return np.array([np.nan if value is None else value for value in values])
+    if all(isinstance(value, bool) for value in values):
+        return np.array(values)
+    return np.array(["none" if value is None else str(value) for value in values])
 
 
 def unreadable(file: Path, error: Exception) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from coupling.studies.case import CASE_FILE, run_case
-from coupling.studies.design import Case, Study, StudyError, cases, load_study
+from coupling.studies.design import Case, Study, StudyError, cases, check_backends, load_study
 from coupling.studies.progress import StudyState, watching
 
 #: Times that a case may lose its worker, the last ones with nothing beside it.
@@ -61,6 +61,7 @@ def study(
     from coupling.studies.collect import collect
 
     plan = load_study(what)
+    check_backends(plan)
     todo = cases(plan)
     folder = Path(out) if out is not None else Path("studies") / plan.name
     tell = progress if progress is not None else lambda line: None
