@@ -3,6 +3,10 @@
 import json
 import os
 import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +19,7 @@ from coupling.studies import case as case_module
 from coupling.studies import execute
 from coupling.studies.case import at_inflow_masses
 from coupling.studies.design import Study, StudyError, cases, load_study, study_names
+from coupling.studies.pool import Pool
 from coupling.studies.progress import CaseProgress, study_state
 from coupling.studies.sensitivity import scatter, sensitivity, tornado
 
@@ -26,7 +31,7 @@ TINY = {
 }
 
 
-def made_up(source, folder, backends, records):
+def made_up(source, folder, backends, records, threads):
     """What `run_case` writes, from a formula: the moment is K0 times the angle; K0 = 0.6 at 60 degrees fails."""
     import tomllib
 
@@ -48,7 +53,7 @@ def made_up(source, folder, backends, records):
     return folder
 
 
-def suicidal(source, folder, backends, records):
+def suicidal(source, folder, backends, records, threads):
     """Kills its worker the first time, and always at 60 degrees with K0 = 0.6."""
     import tomllib
 
@@ -59,7 +64,7 @@ def suicidal(source, folder, backends, records):
         with open(mark, "w"):
             pass
         os.kill(os.getpid(), signal.SIGKILL)
-    return made_up(source, folder, backends, records)
+    return made_up(source, folder, backends, records, threads)
 
 
 @pytest.fixture
@@ -174,15 +179,52 @@ def test_failed_case_costs_only_itself_and_the_rest_is_not_run_again(fast, tmp_p
     assert read.sizes["case"] == 6 and read.attrs["failed"] == 1
 
 
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of the cluster's own event loop
 def test_lost_workers_cost_only_their_case(tmp_path, monkeypatch):
     monkeypatch.setattr(execute, "run_case", suicidal)
     data = coupling.study(TINY, tmp_path / "parallel", workers=2)
     assert data["status"].values.tolist() == ["finished", "failed", "finished", "finished"]
-    assert "KilledWorker" in str(data["message"].values[1])
+    assert "killed (SIGKILL" in str(data["message"].values[1])
     monkeypatch.setattr(execute, "run_case", made_up)
     serial = coupling.study(TINY, tmp_path / "serial", workers=0)
     xr.testing.assert_identical(data["bending_moment"].load(), serial["bending_moment"].load())
+
+
+def test_script_without_a_guard_runs_its_study_in_processes_and_in_silence(tmp_path):
+    script = tmp_path / "mine.py"
+    script.write_text(
+        f"import sys\nsys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+        "import coupling\nfrom small_event import COARSE\n"
+        "fixed = {f'discretisation.{name}': value for name, value in COARSE.items()}\n"
+        "fixed |= {'numerics.relaxation_tolerance': 1e-3, 'stop.time': 0.01, 'stop.inflow_mass': 1.0}\n"
+        "study = coupling.study({'name': 's', 'records': 2, 'fixed': fixed | {'output.interval': 0.005},\n"
+        "    'parameters': {'gate.angle': [60.0, 90.0, 120.0]}}, out=sys.argv[1], workers=2)\n"
+        "print(study.status.values.tolist(), study.case_name.values.tolist())\n"
+    )
+    command = [sys.executable, script, tmp_path / "out"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.stderr == "" and done.returncode == 0
+    assert done.stdout == "['finished', 'finished', 'finished'] ['angle 60', 'angle 90', 'angle 120']\n"
+
+
+def test_interrupted_study_leaves_no_process_behind(tmp_path):
+    class Stopped(Exception):
+        pass
+
+    def stop(key, ended):
+        raise Stopped
+
+    marks = [tmp_path / str(k) for k in range(2)]
+    with pytest.raises(Stopped), Pool(2) as pool:
+        for ending in pool.run(sleeper, {k: (str(mark), 0.0 if k else 60.0) for k, mark in enumerate(marks)}):
+            stop(*ending)
+    pids = [int(mark.read_text()) for mark in marks]
+    assert not [pid for pid in pids if os.path.exists(f"/proc/{pid}")]
+
+
+def sleeper(mark, seconds):
+    with open(mark, "w") as file:
+        file.write(str(os.getpid()))
+    time.sleep(seconds)
 
 
 def test_progress_of_all_cases_is_read_from_their_folders(tmp_path):

@@ -8,12 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
+from coupling.netcdf_group import read_group_at_once
 from coupling.provenance import origin, with_history
 from coupling.studies.design import Case, Study, StudyError
 
+#: Studies whose cases take less than this on the disk are held in memory.
+MOST_BYTES_IN_MEMORY = 5e8
+
 
 def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, str]):
-    """The cases' datasets along a dimension `case`, loaded when used.
+    """The cases' datasets along a dimension `case`; a large study is loaded when used.
 
     Returns
     -------
@@ -34,12 +38,15 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     from coupling.studies.execute import case_file
 
     there = [case for case in cases if case_file(folder, case).is_file()]
-    parts = []
-    for case in there:
-        file = case_file(folder, case)
+    parts, files = [], [case_file(folder, case) for case in there]
+    small = sum(file.stat().st_size for file in files) < MOST_BYTES_IN_MEMORY
+    for file in files:
         try:
-            parts.append(xr.open_dataset(file, engine="h5netcdf", chunks={}, decode_timedelta=False))
-        except (OSError, RuntimeError, ValueError, KeyError) as error:
+            if small:
+                parts.append(read_group_at_once(file))
+            else:
+                parts.append(xr.open_dataset(file, engine="h5netcdf", chunks={}, decode_timedelta=False))
+        except (OSError, RuntimeError, ValueError, KeyError, AttributeError) as error:
             raise StudyError(unreadable(file, error)) from None
     if parts:
         result = xr.concat(

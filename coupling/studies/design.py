@@ -287,11 +287,12 @@ def check_backends(study: Study):
     StudyError
         An unknown model, or the same one twice.
     """
-    from structure.models import lining_model, model_name
+    from structure.models import lining_model, lining_model_names, model_name
 
     try:
         for backend in study.backends:
-            lining_model(backend)
+            if backend not in lining_model_names():
+                lining_model(backend)  # says why not, or finds the class in a file
     except ValueError as problem:
         raise StudyError(f"study '{study.name}': backends: {problem}") from None
     names = [model_name(backend) for backend in study.backends]
