@@ -59,7 +59,7 @@ def key_numbers(run):
     groups = {
         "Gushing": _inflow_numbers(run),
         "Pressures on the lining": _pressure_numbers(run["lining"].to_dataset()),
-        "Forces and deformation of the ring": _ring_numbers(run),
+        ", ".join(["Forces and deformation of the ring", *model_names(run)[:1]]): _ring_numbers(run),
     }
     return {title: numbers for title, numbers in groups.items() if numbers}
 

@@ -1,11 +1,14 @@
 """What the page about a run shows, collected from its datasets."""
 
+import xarray as xr
+
 from coupling.datasets import RunFileError, read_run, run_file
 from coupling.report.fields import field_snapshots, mesh_picture
 from coupling.report.numbers import key_numbers, quality, warnings
 from coupling.report.packing import packed
 from coupling.report.scene_facts import facts, left_out, read_scene, section
 from coupling.report.series import choose_frames, history_series, lining_series, model_names, model_series
+from coupling.run_folder import RunRefused
 from coupling.summary import summarise_run
 
 SCRIPTS = (
@@ -14,8 +17,14 @@ SCRIPTS = (
 )  # fmt: skip
 
 
-def collect(run):
+def collect(run, model=None):
     """Everything that the page shows.
+
+    Parameters
+    ----------
+    run : str or path
+    model : str, optional
+        Lining model whose numbers lead; left out: that of the run itself, see :func:`structure.models.in_order`.
 
     Returns
     -------
@@ -23,7 +32,7 @@ def collect(run):
         attributes, summary, numbers, quality, warnings, notes, facts, left_out: for the text; player: what the script
         draws, JSON.
     """
-    tree = read_run(run)
+    tree = _led_by(read_run(run), model)
     attributes = {name: _plain(value) for name, value in tree.attrs.items()}
     if "history" not in tree.children or "lining" not in tree.children:
         raise RunFileError(f"run file '{run_file(run)}': it holds no run; give the folder that `gush run` wrote")
@@ -44,6 +53,20 @@ def collect(run):
         "left_out": [] if scene is None else left_out(scene),
         "player": _player(tree, scene, frames, fields),
     }
+
+
+def _led_by(tree, model):
+    """The tree with the responses of a model before those of the others; as it is for None."""
+    if model is None:
+        return tree
+    if model not in model_names(tree):
+        raise RunRefused(
+            f"--model: must be a lining model that has answered, got {model!r}; there are "
+            f"{', '.join(model_names(tree)) or 'none'}: run gush respond first"
+        )
+    groups = tree.to_dict()
+    first = {path: groups[path] for path in groups if path.rpartition("/")[2] == model or path == "/"}
+    return xr.DataTree.from_dict(first | groups)
 
 
 def _player(tree, scene, frames, fields):

@@ -30,7 +30,7 @@ def choose_frames(run):
 
 
 def model_names(run):
-    """Lining models that a run holds, in the order they were stored."""
+    """Lining models that a run holds, the leading one first."""
     return list(run["structure"].children) if "structure" in run.children else []
 
 
