@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from coupling.events import EventStream
-from coupling.exit_codes import DIFFERENT, JsonPath, checked_json, failures, warn, write_json
+from coupling.exit_codes import DIFFERENT, JsonPath, checked_json, failures, told_warnings, warn, write_json
 from coupling.measure_commands import accuracy_command, bench_command, stability_command, study_command
 from coupling.published.command import figures_command, published_command
 from coupling.result_commands import export_command, info_command, report_command
@@ -201,7 +201,7 @@ def respond_command(
     JSON: keys of `coupling.summary.summarise_response`, and `run`, `backend`, `file` (path of the response); with
     --limits `utilisations` (largest of every check, 1 is its limit) and `figure` (path).
     """
-    with failures(), checked_json(json_path):
+    with failures(), checked_json(json_path), told_warnings():
         from coupling.checked_response import draw_checks, read_limits, with_checks
         from coupling.pressure_source import read_source
         from coupling.run import respond_by_name
@@ -252,7 +252,7 @@ def compare_command(
     Nothing in RUN changes. JSON: `run`, `models`, `cpu_seconds`, `rows` (see `coupling.compare.compare`),
     `differences`, `responses`, `figures` (paths).
     """
-    with failures(), checked_json(json_path):
+    with failures(), checked_json(json_path), told_warnings():
         from coupling.compare import compare, store
         from coupling.pressure_source import read_source
 

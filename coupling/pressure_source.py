@@ -62,11 +62,11 @@ def read_source(path, scene=None):
     if "tunnel" in pressures.dims:
         gate = chosen.mpm.gate if chosen is not None else None
         pressures = pressures.isel(tunnel=gate.tunnel if gate else 0, drop=True)
+    ring = _ring(file, root, chosen)
     try:
-        check_pressures(pressures)
+        pressures = check_pressures(pressures, ring)
     except ValueError as problem:
         raise RunFileError(f"'{file}': {problem}") from problem
-    ring = _ring(file, root, chosen)
     return Source(file, is_run and own is not None and own.ring == ring, pressures, ring)
 
 

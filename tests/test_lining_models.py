@@ -175,7 +175,7 @@ def spoiled(file, change):
     ("change", "message"),
     [
         (lambda d: d.drop_vars("soil_shear"), "soil_shear must be given"),
-        (lambda d: d.assign(soil_pressure=d["soil_pressure"].assign_attrs(units="kPa")), "must be in Pa"),
+        (lambda d: d.assign(soil_pressure=d["soil_pressure"].assign_attrs(units="kg")), "must be in Pa"),
         (lambda d: d.isel(theta=slice(0, 4)), "at least 8 different angles"),
         (lambda d: d.assign_attrs(ring="{}"), "must describe a structure.Ring"),
         (lambda d: xr.Dataset(d.data_vars, d.coords), "give --scene"),
