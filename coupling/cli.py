@@ -84,7 +84,7 @@ def run_command(
     JSON: keys of `coupling.summary.summarise_run`, and `run` (folder), `figures` (paths), `response` (keys of
     `coupling.summary.summarise_response`, or null). Events: see `coupling.events.EventStream`.
     """
-    with failures(), checked_json(json_path), checked_json(events), EventStream(events) as stream:
+    with failures(), checked_json(json_path), checked_json(events), EventStream(events) as stream, told_warnings():
         from coupling.datasets import RunFileError, read_response
         from coupling.quality import quality_line
         from coupling.run import run
@@ -105,6 +105,8 @@ def run_command(
         with contextlib.suppress(RunFileError):
             data["response"] = summarise_response(read_response(folder))
             data["quality"]["lining_equilibrium"] = data["response"]["equilibrium_residual"]
+            for tunnel, one in data["tunnels"].items():
+                one["response"] = summarise_response(read_response(folder, tunnel=tunnel))
         data["figures"] = sorted(str(path) for path in (folder / FIGURES).glob("*.png"))
         write_json(json_path, data)
         stream.tell("result", **data)
@@ -113,6 +115,9 @@ def run_command(
             console.print(_run_table(data))
             if data["response"]:
                 console.print(_response_table(data["response"]))
+            for tunnel, one in data["tunnels"].items():
+                if one["response"]:
+                    console.print(_response_table(one["response"], tunnel))
             console.print(f"errors: {quality_line(data['quality'])}", highlight=False)
             console.print(f"results in {folder}", highlight=False, soft_wrap=True)
 
@@ -199,37 +204,45 @@ def respond_command(
     FILE-BACKEND.nc.
 
     JSON: keys of `coupling.summary.summarise_response`, and `run`, `backend`, `file` (path of the response); with
-    --limits `utilisations` (largest of every check, 1 is its limit) and `figure` (path).
+    --limits `utilisations` (largest of every check, 1 is its limit) and `figure` (path). Of several tunnels these are
+    of that with the gate, `tunnels` has the same of the others.
     """
     with failures(), checked_json(json_path), told_warnings():
         from coupling.checked_response import draw_checks, read_limits, with_checks
-        from coupling.pressure_source import read_source
+        from coupling.pressure_source import read_sources
         from coupling.run import respond_by_name
         from coupling.stored_response import chosen_file, store_response
         from coupling.summary import summarise_response
 
-        source = read_source(run, scene)
+        sources = read_sources(run, scene)
         given = None if limits is None else read_limits(limits)
         name = backend.rpartition(":")[2]
-        target = chosen_file(source, name, out, overwrite)
-        response = respond_by_name(source.ring, source.pressures, backend)
-        data = {"run": str(run), "backend": name, **summarise_response(response)}
-        if given is not None:
-            response, data["utilisations"] = with_checks(response, given)
-        data["file"] = str(store_response(response, source, name, target))
-        if given is not None:
-            data["figure"] = draw_checks(response, source.file, name, target)
+        targets = [chosen_file(source, name, out, overwrite) for source in sources]
+        answers = []
+        for source, target in zip(sources, targets, strict=True):
+            response = respond_by_name(source.ring, source.pressures, backend)
+            answer = summarise_response(response)
+            if given is not None:
+                response, answer["utilisations"] = with_checks(response, given)
+            answer["file"] = str(store_response(response, source, name, target))
+            if given is not None:
+                answer["figure"] = draw_checks(response, source.file, name, target, source.tunnel)
+            answers.append(answer)
+        data = {"run": str(run), "backend": name, **answers[0]}
+        if len(sources) > 1:
+            data["tunnels"] = {source.tunnel: answer for source, answer in zip(sources[1:], answers[1:], strict=True)}
         write_json(json_path, data)
         if str(json_path) != "-":
             console = Console()
-            console.print(_response_table(data))
-            if given is not None:
-                shares = ", ".join(
-                    f"{check.replace('_', ' ')} {share:.2f}" for check, share in data["utilisations"].items()
-                )
-                console.print(f"largest of its limit: {shares}", highlight=False)
-                console.print(f"picture in {data['figure']}", highlight=False, soft_wrap=True)
-            console.print(f"response in {data['file']}", highlight=False, soft_wrap=True)
+            for source, answer in zip(sources, answers, strict=True):
+                console.print(_response_table(answer, source.tunnel))
+                if given is not None:
+                    shares = ", ".join(
+                        f"{check.replace('_', ' ')} {share:.2f}" for check, share in answer["utilisations"].items()
+                    )
+                    console.print(f"largest of its limit: {shares}", highlight=False)
+                    console.print(f"picture in {answer['figure']}", highlight=False, soft_wrap=True)
+                console.print(f"response in {answer['file']}", highlight=False, soft_wrap=True)
 
 
 @app.command("compare")
@@ -250,22 +263,27 @@ def compare_command(
     """Compare two lining models over the whole event: largest differences with place, time and cause; figures.
 
     Nothing in RUN changes. JSON: `run`, `models`, `cpu_seconds`, `rows` (see `coupling.compare.compare`),
-    `differences`, `responses`, `figures` (paths).
+    `differences`, `responses`, `figures` (paths); of several tunnels that with the gate, the others under `tunnels`.
     """
     with failures(), checked_json(json_path), told_warnings():
         from coupling.compare import compare, store
-        from coupling.pressure_source import read_source
+        from coupling.pressure_source import read_sources
 
-        source = read_source(run, scene)
-        comparison = compare(source, first, second, open_gate)
-        data = {"run": str(run), **store(comparison, source, out)}
+        found = {}
+        for source in read_sources(run, scene):
+            # the gate is in one tunnel only
+            comparison = compare(source, first, second, open_gate if source.tunnel is None else None)
+            found[source.tunnel] = store(comparison, source, out)
+        others = {tunnel: one for tunnel, one in found.items() if tunnel is not None}
+        data = {"run": str(run), **found[None], **({"tunnels": others} if others else {})}
         write_json(json_path, data)
         if str(json_path) != "-":
             console = Console()
-            console.print(_comparison_table(data))
-            times = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in data["cpu_seconds"].items())
-            console.print(f"CPU time for {data['times']} times: {times}", highlight=False)
-            console.print(f"results in {Path(data['differences']).parent}", highlight=False, soft_wrap=True)
+            for tunnel, one in found.items():
+                console.print(_comparison_table(one, tunnel))
+                times = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in one["cpu_seconds"].items())
+                console.print(f"CPU time for {one['times']} times: {times}", highlight=False)
+                console.print(f"results in {Path(one['differences']).parent}", highlight=False, soft_wrap=True)
 
 
 @app.command("scenes")
@@ -385,9 +403,12 @@ def _run_table(data):
         ("inflow mass", f"{data['inflow_mass']:.0f} kg/m"),
         ("flow zone, disturbed zone", f"{data['flow_zone_area']:.1f}, {data['disturbed_area']:.1f} m²"),
     ]
-    for name, label in (("soil_pressure", "soil pressure"), ("water_pressure", "water pressure")):
-        for place, values in data.get(name, {}).items():
-            rows.append((f"{label}, {place}", f"{values['initial'] / 1e3:.0f} -> {values['final'] / 1e3:.0f} kPa"))
+    for tunnel, one in {None: data, **data["tunnels"]}.items():
+        where = "" if tunnel is None else f", tunnel {tunnel}"
+        for name, label in (("soil_pressure", "soil pressure"), ("water_pressure", "water pressure")):
+            for place, values in one.get(name, {}).items():
+                pressure = f"{values['initial'] / 1e3:.0f} -> {values['final'] / 1e3:.0f} kPa"
+                rows.append((f"{label}, {place}{where}", pressure))
     rows += [
         ("steps, mean dt", f"{data['steps']}, {1e6 * data['mean_dt']:.0f} µs ({data['dt_limit']})"),
         ("point-steps per CPU second", f"{data['point_steps_per_cpu_second'] / 1e6:.1f} million"),
@@ -398,8 +419,8 @@ def _run_table(data):
     return table
 
 
-def _response_table(data):
-    table = Table("ring", "initial", "final")
+def _response_table(data, tunnel=None):
+    table = Table("ring" if tunnel is None else f"ring of tunnel {tunnel}", "initial", "final")
     for name, label, unit in (
         ("axial_force", "N", "kN/m"),
         ("shear_force", "Q", "kN/m"),
@@ -420,10 +441,10 @@ def _response_table(data):
     return table
 
 
-def _comparison_table(data):
+def _comparison_table(data, tunnel=None):
     first, second = data["models"]
     table = Table("quantity", "largest difference", "of the extreme", "where", "when", "known cause")
-    table.title = f"{second} less {first}"
+    table.title = f"{second} less {first}{'' if tunnel is None else f', tunnel {tunnel}'}"
     for row in data["rows"]:
         where = f"joint {row['joint']}" if row["joint"] is not None else f"{row['theta']:.4g} deg"
         table.add_row(

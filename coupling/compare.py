@@ -108,7 +108,8 @@ def store(comparison, source, out=None):
     comparison : Comparison
     source : coupling.pressure_source.Source
     out : path, optional
-        `comparison/` beside the file when left out; only files of an earlier comparison are replaced.
+        `comparison/` beside the file when left out; only files of an earlier comparison are replaced. Tunnels without
+        the gate have folders of their own in it.
 
     Returns
     -------
@@ -124,6 +125,8 @@ def store(comparison, source, out=None):
     from coupling.figures import RESOLUTION
 
     folder = source.file.parent / FOLDER if out is None else out
+    if source.tunnel is not None:
+        folder = folder / f"tunnel-{source.tunnel}"
     path = folder / DIFFERENCES
     responses = {name: folder / f"{name}.nc" for name in comparison.responses}
     _claim(folder, (path, *responses.values(), folder / "forces.png", folder / "joints.png"))

@@ -226,6 +226,31 @@ def derived_ring(scene: MpmScene) -> dict[str, Any]:
     }
 
 
+def ring_of(scene: Scene, tunnel: int) -> Ring:
+    """The ring of a tunnel: that of the scene for the tunnel with the gate (else the first), the same concrete and
+    joints with the tunnel's own diameters and the ground at its own axis for any other.
+
+    Raises
+    ------
+    SceneError
+        No ring, or joints that the other diameters do not take.
+    """
+    if scene.ring is None:
+        raise SceneError(f"scene '{scene.name}': has no [ring]; add one to get internal forces")
+    own = scene.mpm.gate.tunnel if scene.mpm.gate is not None else 0
+    if tunnel == own:
+        return scene.ring
+    there, home = scene.mpm.tunnels[tunnel], scene.mpm.tunnels[own]
+    values = scene.ring.model_dump() | {"outer_diameter": there.outer_diameter, "inner_diameter": there.inner_diameter}
+    if values["ground"] is not None and there.axis_depth != home.axis_depth:
+        values["ground"] |= ground_at_axis(scene.mpm, there.axis_depth)
+    try:
+        return Ring.model_validate(values)
+    except ValidationError as error:
+        said = "; ".join(message for _, message in _messages(error, Ring, ()))
+        raise SceneError(f"scene '{scene.name}', ring of tunnel {tunnel}: {said}") from None
+
+
 def ground_at_axis(scene: MpmScene, depth: float) -> dict[str, float]:
     """Soil parameters and effective stresses [Pa] at `depth` [m], for the soil springs of the ring.
 

@@ -17,7 +17,8 @@ def chosen_file(source, model, out=None, overwrite=False):
     model : str
         Name of the lining model.
     out : path, optional
-        Left out: the run where pressures and ring are its own, else `<file>-<model>.nc` beside the file.
+        Left out: the run where pressures and ring are its own, else `<file>-<model>.nc` beside the file. Tunnels
+        without the gate have `-tunnel-<number>` before the ending.
     overwrite : bool
         Replace a file that is there.
 
@@ -29,6 +30,8 @@ def chosen_file(source, model, out=None, overwrite=False):
     if out is None and source.is_own:
         return None
     path = source.file.with_name(f"{source.file.stem}-{model}.nc") if out is None else Path(out)
+    if source.tunnel is not None:
+        path = path.with_name(f"{path.stem}-tunnel-{source.tunnel}{path.suffix}")
     if path.exists() and path.samefile(source.file):
         raise RunRefused(f"output '{path}': must not be the file of the pressures; choose another --out")
     if path.is_dir() or not path.absolute().parent.is_dir():
@@ -41,7 +44,7 @@ def chosen_file(source, model, out=None, overwrite=False):
 def store_response(response, source, model, path):
     """Store a response in the file from :func:`chosen_file`, or in the run for None; returns the file."""
     if path is None:
-        write_response(source.file, response, model)
+        write_response(source.file, response, model, source.tunnel)
         return source.file
     told = with_history("", f"response of {model} to the pressures of {source.file.name}")
     about = {"Conventions": "CF-1.11", **origin(), **response.attrs, "history": told}

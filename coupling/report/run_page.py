@@ -2,12 +2,19 @@
 
 import xarray as xr
 
-from coupling.datasets import RunFileError, read_run, run_file
+from coupling.datasets import RunFileError, read_run, run_file, structure_group
 from coupling.report.fields import field_snapshots, mesh_picture
 from coupling.report.numbers import key_numbers, quality, warnings
 from coupling.report.packing import packed
 from coupling.report.scene_facts import facts, left_out, read_scene, section
-from coupling.report.series import choose_frames, history_series, lining_series, model_names, model_series
+from coupling.report.series import (
+    choose_frames,
+    history_series,
+    lining_series,
+    model_names,
+    model_series,
+    tunnels_beside,
+)
 from coupling.run_folder import RunRefused
 from coupling.summary import summarise_run
 
@@ -77,11 +84,19 @@ def _player(tree, scene, frames, fields):
         "inflow_mass": packed(lining["inflow_mass"].values[frames]),
         "section": section(scene, lining.attrs),
         "lining": lining_series(tree, frames),
-        "models": [model_series(name, tree[f"structure/{name}"].to_dataset(), times) for name in model_names(tree)],
+        "models": _models(tree, None, times),
+        "models_beside": {k: _models(tree, k, times) for k in tunnels_beside(tree)},
         "history": history_series(tree),
         "mesh": mesh_picture(tree["mesh"].to_dataset()) if "mesh" in tree.children else None,
         "fields": fields,
     }
+
+
+def _models(tree, tunnel, times):
+    return [
+        model_series(name, tree[structure_group(name, tunnel)].to_dataset(), times)
+        for name in model_names(tree, tunnel)
+    ]
 
 
 def _thinned(tree, frames, fields, scene):

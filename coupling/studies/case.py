@@ -43,7 +43,7 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, 
 
     from coupling.datasets import read_history, read_pressures, write_response
     from coupling.provenance import root_attributes
-    from coupling.run import respond, respond_beside, run
+    from coupling.run import gate_tunnel, respond, respond_beside, run
     from coupling.run_folder import RUN_FILE, RunRefused
     from coupling.scene import parse_scene
     from coupling.studies.progress import CaseProgress
@@ -68,7 +68,7 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, 
     report({"stage": "respond"})
     pressures, history = read_pressures(run_folder), read_history(run_folder)
     if "tunnel" in pressures.dims:
-        pressures = pressures.isel(tunnel=scene.mpm.gate.tunnel if scene.mpm.gate else 0, drop=True)
+        pressures = pressures.isel(tunnel=gate_tunnel(scene), drop=True)
     responses = {}
     for name, backend in models.items():
         responses[name] = respond(scene, pressures, backend)
