@@ -158,9 +158,10 @@ def _accuracy_table(data):
 
 def _study_table(data):
     table = Table(title=f"{data['study']}{', ' + data['model'] if data['model'] else ''}")
-    table.add_column("case", min_width=min(28, max(len(case["name"]) for case in data["cases"])))
-    for head in ("status", "kg/m", "after s", "N max kN/m", "M kN m/m", "CPU s"):
-        table.add_column(head)
+    table.add_column("case", min_width=min(22, max(len(case["name"]) for case in data["cases"])))
+    for head in ("kg/m", "after s", "N max kN/m", "M kN m/m", "CPU s"):
+        table.add_column(head, no_wrap=True)
+    table.add_column("status")
     for case in data["cases"]:
         cells = [""] * 5
         if case["status"] == "finished":
@@ -169,5 +170,5 @@ def _study_table(data):
             cells += [f"{force['max'] / 1e3:.0f}" if force else "-"]
             cells += [f"{moment['min'] / 1e3:.0f} to {moment['max'] / 1e3:.0f}" if moment else "-"]
             cells += [f"{case['cpu_seconds']:.1f}"]
-        table.add_row(case["name"], case["message"] or case["status"], *cells)
+        table.add_row(case["name"], *cells, case["message"] or case["status"])
     return table

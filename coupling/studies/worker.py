@@ -15,7 +15,7 @@ from multiprocessing.connection import Connection
 #: What a case needs and takes long to load; none of it starts a thread.
 LOADED = (
     "coupling.run", "coupling.studies.case", "mpm.meshing", "mpm.simulation", "structure.beam_spring",
-    "scipy.interpolate", "gmsh",
+    "scipy.interpolate", "gmsh", "meshio", "h5netcdf", "pint", "dask.array", "dask.distributed",
 )  # fmt: skip
 
 
@@ -92,3 +92,4 @@ def work(connection):
 if __name__ == "__main__":
     # by its name, as the other side knows the class of what it is told
     import_module("coupling.studies.worker").serve([int(each) for each in sys.argv[1:]])
+    os._exit(0)  # nothing is left that would have to be tidied up
