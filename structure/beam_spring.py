@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from structure.balance import refuse_unbalanced
+from structure.balance import borne, even_loads, without_unborne
 from structure.beam_geometry import RingMesh, element_matrices, joint_matrices, self_weight, traction_operator
 from structure.equilibrium import NoEquilibrium, RingEquilibrium
 from structure.lining import LiningFailure, LiningModel, check_pressures, response_dataset
@@ -37,8 +37,7 @@ class BeamSpringLining(LiningModel):
         self._weight = self_weight(ring, self.mesh)
         self._joint_jumps = joint_matrices(ring)[0]
         fine = np.radians(np.arange(0, 360, 0.5))
-        lift = traction_operator(ring, self.mesh, fine)[0] @ np.cos(fine)
-        self._unit_balance = lift / self._resultant(lift)[1]
+        self._uplift, self._even = even_loads(fine, *traction_operator(ring, self.mesh, fine), self._resultant)
 
     def respond(self, pressures: xr.Dataset) -> xr.Dataset:
         ordered = check_pressures(pressures)
@@ -46,10 +45,12 @@ class BeamSpringLining(LiningModel):
         times = ordered["time"].values
         shear = ordered["soil_shear"].values.astype(float)
         loads, balanced = self._loads(theta, ordered["soil_pressure"] + ordered["water_pressure"], shear)
-        refuse_unbalanced(self.ring, self._resultant(loads), self._magnitude(loads), times)
+        loads, unborne = without_unborne(
+            self.ring, loads, self._resultant(loads), self._magnitude(loads), self._even, times
+        )
         displacements, slips = self._displacements(loads, times)
         springs = np.stack([self._equilibrium.spring_forces(row)[0].ravel() for row in displacements])
-        fields = {"balanced_uplift": balanced}
+        fields = {"balanced_uplift": balanced, "unborne_resultant": unborne}
         fields |= self._internal_forces(displacements)
         fields |= self._joints(displacements, slips)
         fields |= self._balances(displacements, slips, loads, springs)
@@ -64,7 +65,7 @@ class BeamSpringLining(LiningModel):
         balanced = np.zeros(len(loads))
         if self.ring.balance_uplift:
             balanced = self._resultant(loads)[1]
-            loads = loads - balanced[:, None] * self._unit_balance
+            loads = loads - balanced[:, None] * self._uplift
         return loads, balanced
 
     def _resultant(self, forces: np.ndarray) -> np.ndarray:
@@ -183,7 +184,7 @@ class BeamSpringLining(LiningModel):
     def _movements(self, displacements):
         """Displacements at the middle of the elements, change of the diameters, settlement.
 
-        A ring that nothing holds has no place of its own: its mean movement is taken out.
+        A ring has no place of its own where nothing holds it: that mean movement is taken out.
         """
         mesh = self.mesh
         nodal = displacements.reshape(len(displacements), -1, 3)
@@ -191,11 +192,13 @@ class BeamSpringLining(LiningModel):
         radial, tangential = nodal[..., 0], nodal[..., 1]
         right = ((radial * sine + tangential * cosine) * share).sum(1, keepdims=True)
         up = ((radial * cosine - tangential * sine) * share).sum(1, keepdims=True)
-        if self.ring.ground is None and self.ring.support == "free":
+        sideways, _, turning = borne(self.ring)
+        if not sideways:
             radial = radial - right * sine - up * cosine
             tangential = tangential - right * cosine + up * sine
-            tangential = tangential - (tangential * share).sum(1, keepdims=True)
             up = np.zeros_like(up)
+        if not turning:
+            tangential = tangential - (tangential * share).sum(1, keepdims=True)
         crown, right_waist, invert, left_waist = (self._radial_at(radial, quarter * np.pi / 2) for quarter in range(4))
         lean = mesh.span / 2
         first_w, second_w = radial[:, mesh.first], radial[:, mesh.second]

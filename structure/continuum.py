@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
-from structure.balance import refuse_unbalanced
+from structure.balance import borne, even_loads, without_unborne
 from structure.beam_geometry import RingMesh
 from structure.continuum_bolts import Bolts, anchor_place, bolt_elongation, bolt_shares, check_bolts, near_anchors
 from structure.continuum_equilibrium import SpringEquilibrium
@@ -129,8 +129,7 @@ class ContinuumLining(LiningModel):
             0.0 if bolts is None else bolts.stiffness,
         )
         fine = np.radians(np.arange(0, 360, 0.5))
-        lift = traction_operator(ring, self.mesh, fine)[0] @ np.cos(fine)
-        self._unit_balance = lift / self._resultant(lift)[1]
+        self._uplift, self._even = even_loads(fine, *traction_operator(ring, self.mesh, fine), self._resultant)
 
     @property
     def iterations(self) -> list[int]:
@@ -145,9 +144,8 @@ class ContinuumLining(LiningModel):
     def respond(self, pressures: xr.Dataset) -> xr.Dataset:
         ordered = check_pressures(pressures)
         times = ordered["time"].values
-        unknowns, loads, balanced = self._solve(ordered)
+        unknowns, loads, fields = self._solve(ordered)
         displacements = (self._to_nodes @ unknowns.T).T
-        fields = {"balanced_uplift": balanced}
         fields |= self._internal_forces(unknowns, displacements)
         fields |= self._joint_fields(unknowns)
         fields |= self._balances(unknowns, loads)
@@ -211,7 +209,7 @@ class ContinuumLining(LiningModel):
         return whole if self.ring.support == "invert" else whole[[1, -2, -1]]
 
     def _solve(self, ordered):
-        """Unknowns and the loads on them (n_times, n_unknowns), and the uplift balanced among the loads."""
+        """Unknowns and the loads on them (n_times, n_unknowns), and the fields of what was balanced."""
         theta, times = np.radians(ordered["theta"].values.astype(float)), ordered["time"].values
         by_pressure, by_shear = traction_operator(self.ring, self.mesh, theta)
         pressure = (ordered["soil_pressure"] + ordered["water_pressure"]).values.astype(float)
@@ -219,8 +217,9 @@ class ContinuumLining(LiningModel):
         balanced = np.zeros(len(loads))
         if self.ring.balance_uplift:
             balanced = self._resultant(loads)[1]
-            loads = loads - balanced[:, None] * self._unit_balance
-        refuse_unbalanced(self.ring, self._resultant(loads), np.array([_magnitude(row) for row in loads]), times)
+            loads = loads - balanced[:, None] * self._uplift
+        magnitude = np.array([_magnitude(row) for row in loads])
+        loads, unborne = without_unborne(self.ring, loads, self._resultant(loads), magnitude, self._even, times)
         loads = (self._to_nodes.T @ loads.T).T
         unknowns = np.zeros_like(loads)
         self._equilibrium.iterations.clear()
@@ -229,7 +228,7 @@ class ContinuumLining(LiningModel):
         with threadpool_limits(limits=1, user_api="blas"):
             for index, load in enumerate(loads):
                 unknowns[index] = start = self._solve_one(load, start, float(times[index]))
-        return unknowns, loads, balanced
+        return unknowns, loads, {"balanced_uplift": balanced, "unborne_resultant": unborne}
 
     def _solve_one(self, load, start, time):
         try:
@@ -359,19 +358,21 @@ class ContinuumLining(LiningModel):
     def _movements(self, displacements):
         """Displacements at the angles of the response, change of the diameters, settlement.
 
-        A ring that nothing holds has no place of its own: its mean movement is taken out.
+        A ring has no place of its own where nothing holds it: that mean movement is taken out.
         """
         sine, cosine = np.sin(self.mesh.node_angle), np.cos(self.mesh.node_angle)
         radial, tangential = displacements[:, 0::2], displacements[:, 1::2]
         right = (radial * sine + tangential * cosine) @ self._share
         up = (radial * cosine - tangential * sine) @ self._share
-        if self.ring.ground is None and self.ring.support == "free":
-            relative = np.empty_like(displacements)
-            relative[:, 0::2] = radial - np.outer(right, sine) - np.outer(up, cosine)
-            turned = tangential - np.outer(right, cosine) + np.outer(up, sine)
-            turn = turned @ self._share / self.ring.centre_radius
-            relative[:, 1::2] = turned - np.outer(turn, self.mesh.node_radius)
-            displacements, up = relative, np.zeros_like(up)
+        sideways, _, turning = borne(self.ring)
+        if not sideways:
+            radial = radial - np.outer(right, sine) - np.outer(up, cosine)
+            tangential = tangential - np.outer(right, cosine) + np.outer(up, sine)
+            up = np.zeros_like(up)
+        if not turning:
+            turn = tangential @ self._share / self.ring.centre_radius
+            tangential = tangential - np.outer(turn, self.mesh.node_radius)
+        displacements = np.stack([radial, tangential], axis=2).reshape(displacements.shape)
         crown, right_waist, invert, left_waist = ((side @ displacements.T).mean(0) for side in self._quarters)
         return {
             "displacement_radial": self._where_solid((self._movement[0] @ displacements.T).T),

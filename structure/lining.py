@@ -46,10 +46,15 @@ RESPONSE = {
     "spring_sum_horizontal": (("time",), "N m-1", "horizontal sum of soil springs and support, right positive"),
     "spring_sum_vertical": (("time",), "N m-1", "vertical sum of soil springs and support, up positive"),
     "balanced_uplift": (("time",), "N m-1", "vertical sum of pressures and weight balanced by radial soil pressure"),
+    "unborne_resultant": (
+        ("time",),
+        "1",
+        "force or torque that nothing bears, taken out evenly, over the sum of loads",
+    ),
 }
 
 #: Variables of a response that are no state of the ring: their change since the first record says nothing.
-NOT_ADDITIONAL = ("equilibrium_residual", "shear_moment_residual", "inflow_mass")
+NOT_ADDITIONAL = ("equilibrium_residual", "shear_moment_residual", "unborne_resultant", "inflow_mass")
 
 #: name: (units, long name)
 COORDINATES = {
