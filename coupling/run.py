@@ -179,9 +179,10 @@ def respond_by_name(ring, pressures, backend, **options):
         As :func:`respond`.
     """
     from structure import lining_model
+    from structure.lining import at_whole_degrees
 
     try:
-        return lining_model(backend)(ring, **options).respond(pressures)
+        return at_whole_degrees(lining_model(backend)(ring, **options).respond(pressures))
     except ValueError as problem:
         raise RunRefused(str(problem)) from problem
 

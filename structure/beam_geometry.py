@@ -248,6 +248,40 @@ def _periodic_interpolation(theta: np.ndarray, angle: np.ndarray):
     return (before % len(theta), after), (1 - share, share)
 
 
+def forces_at(mesh: RingMesh, theta: np.ndarray) -> sparse.csr_array:
+    """Section forces at angles theta [rad] from those at the middles of the elements, (n_theta, n_elements).
+
+    Linear between the middles, also across a joint, which passes on all that reaches it.
+    """
+    middle = mesh.mid_angle % (2 * np.pi)
+    order = np.argsort(middle)
+    samples, shares = _periodic_interpolation(middle[order], theta)
+    place = (np.tile(np.arange(len(theta)), 2), order[np.concatenate(samples)])
+    return sparse.coo_array((np.concatenate(shares), place), shape=(len(theta), len(middle))).tocsr()
+
+
+def displacements_at(mesh: RingMesh, theta: np.ndarray) -> tuple[sparse.csr_array, sparse.csr_array]:
+    """Radial and tangential displacement of the centre line at theta [rad], (n_theta, 3 n_nodes) each.
+
+    Straight between the two nodes of an element. On a joint one of its sides is taken.
+    """
+    along = (theta[:, None] - mesh.node_angle[mesh.first]) % (2 * np.pi)
+    element = np.argmax(along <= mesh.span, axis=1)
+    share = along[np.arange(len(theta)), element] / mesh.span[element]
+    rows, columns, radial, tangential = [], [], [], []
+    for nodes, of_node in ((mesh.first[element], 1 - share), (mesh.second[element], share)):
+        cosine, sine = np.cos(theta - mesh.node_angle[nodes]), np.sin(theta - mesh.node_angle[nodes])
+        for way, values in enumerate(((cosine, -sine), (sine, cosine))):
+            rows.append(np.arange(len(theta)))
+            columns.append(3 * nodes + way)
+            radial.append(of_node * values[0])
+            tangential.append(of_node * values[1])
+    place, shape = (np.concatenate(rows), np.concatenate(columns)), (len(theta), 3 * mesh.n_nodes)
+    return tuple(
+        sparse.coo_array((np.concatenate(values), place), shape=shape).tocsr() for values in (radial, tangential)
+    )
+
+
 def self_weight(ring: Ring, mesh: RingMesh) -> np.ndarray:
     """Nodal forces of the concrete's weight, (3 n_nodes,); all of it on the centre line."""
     element, angle, weight = arc_pieces(mesh.node_angle[mesh.first], mesh.span, np.zeros(0))

@@ -114,7 +114,7 @@ def test_mirrored_pressures_give_the_mirrored_response():
     for name, sign in {"axial_force": 1, "bending_moment": 1, "shear_force": -1, "displacement_radial": 1}.items():
         largest = np.abs(one[name]).max().item()
         # 1e-7: Newton's tolerance, amplified by the softness of the ring.
-        np.testing.assert_allclose(other[name].values[:, ::-1], sign * one[name].values, atol=1e-7 * largest)
+        np.testing.assert_allclose(other[name].values[:, -np.arange(360)], sign * one[name].values, atol=1e-7 * largest)
 
 
 def test_answer_does_not_depend_on_the_history_of_the_guess():

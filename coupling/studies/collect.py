@@ -31,13 +31,15 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     import xarray as xr
 
     from coupling.studies.execute import case_file
+    from structure.lining import at_whole_degrees
 
     there = [case for case in cases if case_file(folder, case).is_file()]
     parts = []
     for case in there:
         file = case_file(folder, case)
         try:
-            parts.append(xr.open_dataset(file, engine="h5netcdf", chunks={}, decode_timedelta=False))
+            part = xr.open_dataset(file, engine="h5netcdf", chunks={}, decode_timedelta=False)
+            parts.append(at_whole_degrees(part, "theta_ring"))  # as earlier versions called the angles of the ring
         except (OSError, RuntimeError, ValueError, KeyError) as error:
             raise StudyError(unreadable(file, error)) from None
     if parts:
