@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mpm.element_size import element_size, gate_size, headroom_height
+from mpm.element_size import element_size, gate_size, growth, headroom_height
 from mpm.mesh import CHANNEL, HEADROOM, INTERIOR, SOIL, MeshError
 from mpm.scene import Scene, Tunnel
 
@@ -160,9 +160,9 @@ def _ring(
     else:
         ends = sorted({0.0, 90.0, 180.0, 270.0} if not cuts else {*cuts, 0.0, 180.0})
         ends.append(ends[0] + 360.0)
-    hard = {t % 360.0 for t in cuts} | ({0.0, 180.0} if half_model else set())
+    hard = [*cuts, *([0.0, 180.0] if half_model else [])]
     arcs = list(pairwise(ends))
-    is_opening = [len(opening) > 0 and abs((a - opening[0]) % 360.0) < 1e-9 for a, _ in arcs]
+    is_opening = [len(opening) > 0 and _same_angle(a, opening[0]) for a, _ in arcs]
     measure = [
         _cumulative(scene, place(tunnel, radius, np.linspace(a, b, SAMPLES))) for a, b in arcs
     ]
@@ -183,16 +183,21 @@ def _ring(
         angles = np.mod(angles, 360.0)
         angles = np.where(angles > 360.0 - 1e-12, 0.0, angles)
         angles = np.sort(angles)
+
     def nearest(value: float) -> int:
         return int(np.argmin(np.abs((angles - value + 180.0) % 360.0 - 180.0)))
 
     return _Ring(angles, not half_model, [nearest(t) for t in cuts], np.array([nearest(t) for t in opening], int))
 
 
+def _same_angle(a: float, b: float) -> bool:
+    return abs((a - b + 180.0) % 360.0 - 180.0) < 1e-9
+
+
 def _make_even(arcs, counts, is_opening, hard, measure, closed):
     """Give an arc one edge more or less where the number of edges between two hard stations is odd."""
     n = len(arcs)
-    starts = [i for i, (a, _) in enumerate(arcs) if a % 360.0 in hard] or [0]
+    starts = [i for i, (a, _) in enumerate(arcs) if any(_same_angle(a, t) for t in hard)] or [0]
     for first, last in zip(starts, [*starts[1:], starts[0] + n if closed else n], strict=True):
         group = [i % n for i in range(first, last)]
         if sum(counts[i] for i in group) % 2:
@@ -219,11 +224,10 @@ def _rows(scene, outline, tunnel, ring, face, radius, count, outward, heights):
             padded = np.concatenate([thickness[1:2], thickness, thickness[-2:-1]])
             thickness = 0.5 * thickness + 0.25 * (padded[2:] + padded[:-2])
     grid = [face]
-    growth = scene.discretisation.size_growth
     offset = np.zeros_like(thickness)
     on_axis = np.zeros(len(theta), bool) if ring.closed else np.isin(np.arange(len(theta)), [0, len(theta) - 1])
     for j in range(count):
-        offset = offset + thickness * (1 + 0.5 * growth * j)
+        offset = offset + thickness * (1 + 0.5 * growth(scene) * j)
         r = radius + (offset if outward else -offset)
         angle = theta.copy()
         if ring.cuts:
