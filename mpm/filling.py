@@ -55,6 +55,8 @@ def fill_faces(scene: Scene, outline: Outline, algorithm: int) -> None:
             "Mesh.MeshSizeFromCurvature": 0,
             "Mesh.RecombineAll": 1,
             "Mesh.RecombinationAlgorithm": 1,
+            # The cells are relaxed afterwards; the changes of topology may go round in circles for ever.
+            "Mesh.RecombineOptimizeTopology": 0,
         }.items():
             gmsh.option.setNumber(option, value)
         gmsh.model.add(name)
@@ -335,5 +337,8 @@ def crossing(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     first, second = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
     between = corners[:, 1] - corners[:, 0]
     turn = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-    share = (between[:, 0] * second[:, 1] - between[:, 1] * second[:, 0]) / np.where(turn > 0, turn, math.nan)
-    return corners[:, 0] + share[:, None] * first
+    turn = np.where(turn > 0, turn, math.nan)
+    share = (between[:, 0] * second[:, 1] - between[:, 1] * second[:, 0]) / turn
+    other = (between[:, 0] * first[:, 1] - between[:, 1] * first[:, 0]) / turn
+    meet = (share > 0) & (share < 1) & (other > 0) & (other < 1)
+    return np.where(meet[:, None], corners[:, 0] + share[:, None] * first, math.nan)

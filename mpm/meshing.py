@@ -46,7 +46,10 @@ def build_mesh(scene: Scene) -> Mesh:
     """
     best: tuple[float, NDArray[np.float64], Outline, NDArray[np.int64]] | None = None
     for rows, algorithm in ATTEMPTS:
-        outline, cells = _cells(scene, rows, algorithm)
+        outline = draw_scene(scene, rows)
+        if not _is_regular(outline):
+            continue
+        cells = _cells(scene, outline, algorithm)
         lowest, where = _flattest(scene, outline.nodes, cells)
         if best is None or lowest > best[0]:
             best = lowest, where, outline, cells
@@ -65,9 +68,18 @@ def build_mesh(scene: Scene) -> Mesh:
     return with_mirror_image(mesh) if scene.is_half else mesh
 
 
-def _cells(scene: Scene, rows: int, algorithm: int) -> tuple[Outline, NDArray[np.int64]]:
-    """One attempt: an outline with all its nodes, and the corners of its cells, counter-clockwise."""
-    outline = draw_scene(scene, rows)
+def _is_regular(outline: Outline) -> bool:
+    """Whether the cells drawn by hand are convex and none is turned over: lines that cut a lining may fold them."""
+    for block in outline.cells:
+        area = _area(outline.nodes[block])
+        corners = outline.nodes[block if area[0] > 0 else block[:, ::-1]]
+        if not np.all(area * area[0] > 0) or np.isnan(crossing(corners)).any():
+            return False
+    return True
+
+
+def _cells(scene: Scene, outline: Outline, algorithm: int) -> NDArray[np.int64]:
+    """Fill an outline; corners of all cells, counter-clockwise."""
     fill_faces(scene, outline, algorithm)
     cells = np.concatenate(outline.cells)
     turned = _area(outline.nodes[cells]) < 0
@@ -81,7 +93,7 @@ def _cells(scene: Scene, rows: int, algorithm: int) -> tuple[Outline, NDArray[np
     cells = np.concatenate(outline.cells)
     turned = np.flatnonzero(_area(outline.nodes[cells[beside:]]) < 0) + beside
     cells[turned] = cells[turned][:, ::-1]
-    return outline, cells
+    return cells
 
 
 def _area(corners: NDArray[np.float64]) -> NDArray[np.float64]:
