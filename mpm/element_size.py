@@ -12,14 +12,6 @@ from mpm.scene import Scene, Tunnel
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Growth per metre above which neighbouring quadrilaterals of such sizes are no longer near squares.
-STEEPEST = 0.25
-
-
-def growth(scene: Scene) -> float:
-    """Growth of the element size with the distance from a feature [-], at most `STEEPEST`."""
-    return min(scene.discretisation.size_growth, STEEPEST)
-
 
 def element_size(scene: Scene, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
     """Element size asked for at (x, y) [m]: the smallest of the scene's sizes, each growing with distance.
@@ -31,7 +23,7 @@ def element_size(scene: Scene, x: NDArray[np.float64], y: NDArray[np.float64]) -
     """
     d = scene.discretisation
     x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    size, slope = np.full(np.broadcast(x, y).shape, d.element_size), growth(scene)
+    size, slope = np.full(np.broadcast(x, y).shape, d.element_size), scene.discretisation.growth
     for each in scene.tunnels:
         gap = np.abs(np.hypot(x - each.x, y + each.axis_depth) - each.outer_radius)
         size = np.minimum(size, d.element_size_lining + slope * gap)
@@ -40,11 +32,12 @@ def element_size(scene: Scene, x: NDArray[np.float64], y: NDArray[np.float64]) -
         return size
     inside = np.hypot(x - tunnel.x, y + tunnel.axis_depth) < tunnel.inner_radius
     size = np.where(inside, np.minimum(size, d.element_size_interior), size)
-    # Distance to the channel's centre line, from outer to inner face.
+    # Distance to the channel, from outer to inner face and from wall to wall.
     along, across = gate_axes(gate.angle)
     s = (x - tunnel.x) * along[0] + (y + tunnel.axis_depth) * along[1]
     t = (x - tunnel.x) * across[0] + (y + tunnel.axis_depth) * across[1]
-    distance = np.hypot(s - np.clip(s, tunnel.inner_radius, tunnel.outer_radius), t)
+    beside = np.maximum(np.abs(t) - gate.width / 2, 0.0)
+    distance = np.hypot(s - np.clip(s, tunnel.inner_radius, tunnel.outer_radius), beside)
     return np.minimum(size, gate_size(scene) + slope * distance)
 
 
@@ -72,7 +65,7 @@ def gate_axes(angle: float) -> tuple[tuple[float, float], tuple[float, float]]:
 
 def size_callback(scene: Scene, factor: float) -> Any:
     """`factor` times `element_size` for one point, in scalar arithmetic: gmsh asks some 10 000 times."""
-    d, slope = scene.discretisation, growth(scene)
+    d, slope = scene.discretisation, scene.discretisation.growth
     rings = [(t.x, -t.axis_depth, t.outer_radius) for t in scene.tunnels]
     gate, tunnel = scene.gate, gate_tunnel(scene)
 
@@ -88,7 +81,8 @@ def size_callback(scene: Scene, factor: float) -> Any:
             result = min(result, d.element_size_interior)
         s = dx * along[0] + dy * along[1]
         t = dx * across[0] + dy * across[1]
-        distance = math.hypot(s - min(max(s, tunnel.inner_radius), tunnel.outer_radius), t)
+        beside = max(abs(t) - gate.width / 2, 0.0)
+        distance = math.hypot(s - min(max(s, tunnel.inner_radius), tunnel.outer_radius), beside)
         return factor * min(result, at_gate + slope * distance)
 
     if gate is not None:

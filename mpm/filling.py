@@ -174,7 +174,11 @@ def _import_gmsh() -> Any:
 
 
 def relax(
-    nodes: NDArray[np.float64], free: NDArray[np.bool_], cells: NDArray[np.int64], size: NDArray[np.float64], iterations: int
+    nodes: NDArray[np.float64],
+    free: NDArray[np.bool_],
+    cells: NDArray[np.int64],
+    size: NDArray[np.float64],
+    iterations: int,
 ) -> NDArray[np.float64]:
     """Move the free nodes until the corners of the cells are as square as the lines allow.
 

@@ -102,18 +102,14 @@ def _area(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     return 0.5 * (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
 
 
-def _crossed(
-    nodes: NDArray[np.float64], cells: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _crossed(nodes: NDArray[np.float64], cells: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Nodes with the centres of the cells behind them, and the four triangles of each cell."""
     number = np.broadcast_to(len(nodes) + np.arange(len(cells))[:, None], cells.shape)
     triangles = np.stack([cells, np.roll(cells, -1, axis=1), number], axis=-1).reshape(-1, 3)
     return np.concatenate([nodes, crossing(nodes[cells])]), triangles
 
 
-def _flattest(
-    scene: Scene, nodes: NDArray[np.float64], cells: NDArray[np.int64]
-) -> tuple[float, NDArray[np.float64]]:
+def _flattest(scene: Scene, nodes: NDArray[np.float64], cells: NDArray[np.int64]) -> tuple[float, NDArray[np.float64]]:
     """Smallest altitude over the size asked for, and the place of that triangle."""
     points, triangles = _crossed(nodes, cells)
     middle = points[triangles].mean(axis=1)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mpm.element_size import element_size, gate_size, growth, headroom_height
+from mpm.element_size import element_size, gate_size, headroom_height
 from mpm.mesh import CHANNEL, HEADROOM, INTERIOR, SOIL, MeshError
 from mpm.scene import Scene, Tunnel
 
@@ -94,9 +94,7 @@ def _cumulative(scene: Scene, path: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _divide(cumulative: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """Shares of a path's parameter at which `count` edges begin and end, each of the same number of local sizes."""
-    share = np.interp(
-        np.arange(1, count) * cumulative[-1] / count, cumulative, np.linspace(0, 1, len(cumulative))
-    )
+    share = np.interp(np.arange(1, count) * cumulative[-1] / count, cumulative, np.linspace(0, 1, len(cumulative)))
     return np.concatenate([[0.0], share, [1.0]])
 
 
@@ -127,9 +125,7 @@ class _Ring:
     opening: NDArray[np.int64]
 
 
-def _ring(
-    scene: Scene, tunnel: Tunnel, radius: float, cuts: list[float], has_gate: bool, multiple: int = 2
-) -> _Ring:
+def _ring(scene: Scene, tunnel: Tunnel, radius: float, cuts: list[float], has_gate: bool, multiple: int = 2) -> _Ring:
     """Divide a circle. Between two cuts, and around as a whole, there is an even number of edges or a `multiple`.
 
     cuts : angles [deg] where horizontal lines meet the circle.
@@ -163,9 +159,7 @@ def _ring(
     hard = [*cuts, *([0.0, 180.0] if half_model else [])]
     arcs = list(pairwise(ends))
     is_opening = [len(opening) > 0 and _same_angle(a, opening[0]) for a, _ in arcs]
-    measure = [
-        _cumulative(scene, place(tunnel, radius, np.linspace(a, b, SAMPLES))) for a, b in arcs
-    ]
+    measure = [_cumulative(scene, place(tunnel, radius, np.linspace(a, b, SAMPLES))) for a, b in arcs]
     counts = [
         len(opening) - 1 if open_ else max(1, math.ceil(m[-1] - 0.25))
         for m, open_ in zip(measure, is_opening, strict=True)
@@ -227,7 +221,7 @@ def _rows(scene, outline, tunnel, ring, face, radius, count, outward, heights):
     offset = np.zeros_like(thickness)
     on_axis = np.zeros(len(theta), bool) if ring.closed else np.isin(np.arange(len(theta)), [0, len(theta) - 1])
     for j in range(count):
-        offset = offset + thickness * (1 + 0.5 * growth(scene) * j)
+        offset = offset + thickness * (1 + 0.5 * scene.discretisation.growth * j)
         r = radius + (offset if outward else -offset)
         angle = theta.copy()
         if ring.cuts:
@@ -282,7 +276,12 @@ def horizontal_lines(scene: Scene) -> list[float]:
         rise, radius = table + tunnel.axis_depth, tunnel.outer_radius
         if abs(abs(rise) - radius) < max(0.35 * radius, 4 * scene.discretisation.element_size_lining):
             return layers
-        if abs(rise) < radius and scene.gate is not None and scene.gate.tunnel == i and _meets_gate(scene, tunnel, table):
+        if (
+            abs(rise) < radius
+            and scene.gate is not None
+            and scene.gate.tunnel == i
+            and _meets_gate(scene, tunnel, table)
+        ):
             return layers
     return sorted([*layers, table], reverse=True)
 
@@ -384,7 +383,9 @@ def _draw_gate(scene, outline, tunnel, ring, rows):
         ends = [-1] if scene.gate.angle == 0 else [0]
     outline.corners = mouth[ends]
     outline.walls = [columns[end][1:] for end in ends]
-    strict = slice(0 if scene.is_half and scene.gate.angle == 0 else 1, None if scene.is_half and scene.gate.angle == 180 else -1)
+    strict = slice(
+        0 if scene.is_half and scene.gate.angle == 0 else 1, None if scene.is_half and scene.gate.angle == 180 else -1
+    )
     outline.opening, outline.inner_opening = mouth[strict], throat[strict]
     if scene.interior != "resolved":
         return
