@@ -383,9 +383,8 @@ def _draw_gate(scene, outline, tunnel, ring, rows):
         ends = [-1] if scene.gate.angle == 0 else [0]
     outline.corners = mouth[ends]
     outline.walls = [columns[end][1:] for end in ends]
-    strict = slice(
-        0 if scene.is_half and scene.gate.angle == 0 else 1, None if scene.is_half and scene.gate.angle == 180 else -1
-    )
+    # Of the two ends of a half model's opening one lies on the mirror line and is no corner.
+    strict = slice(0 if ends == [-1] else 1, None if ends == [0] else -1)
     outline.opening, outline.inner_opening = mouth[strict], throat[strict]
     if scene.interior != "resolved":
         return
@@ -441,7 +440,7 @@ def _draw_ground(scene, outline, lines, rings, edges):
     inside = []
     for k, y in enumerate(lines, start=1):
         met = []
-        for tunnel, ring, edge in zip(scene.tunnels, rings, edges, strict=True):
+        for ring, edge in zip(rings, edges, strict=True):
             at = [edge[i] for i in ring.cuts if abs(outline.nodes[edge[i], 1] - y) < 1e-12]
             met += at
         met.sort(key=lambda node: outline.nodes[node, 0])
