@@ -58,8 +58,6 @@ def fill_faces(scene: Scene, outline: Outline, algorithm: int) -> None:
             "Mesh.MeshSizeFromCurvature": 0,
             "Mesh.RecombineAll": 1,
             "Mesh.RecombinationAlgorithm": 1,
-            # The cells are relaxed afterwards; the changes of topology may go round in circles for ever.
-            "Mesh.RecombineOptimizeTopology": 0,
         }.items():
             gmsh.option.setNumber(option, value)
         gmsh.model.add(name)

@@ -109,7 +109,7 @@ def _line(scene: Scene, outline: Outline, start: int, end: int, beside: list[Nod
     if beside is not None and (sum(len(line) - 1 for line in beside) // 2 + pairs) % 2:
         pairs += 1 if pairs == 1 or pairs < cumulative[-1] / 2 else -1
     share = _divide(cumulative, 2 * pairs)[1:-1, None]
-    horizontal = a[1] == b[1]
+    horizontal = bool(a[1] == b[1])
     between = outline.add(a + share * (b - a), horizontal, not horizontal)
     outline.nodes[between, 1 if horizontal else 0] = a[1 if horizontal else 0]
     return np.concatenate([[start], between, [end]])
@@ -347,6 +347,8 @@ def draw_scene(scene: Scene, rows: int) -> Outline:
         cuts = sorted((t, y) for t, y in cuts if not scene.is_half or t < 180)
         ring = _ring(scene, tunnel, tunnel.outer_radius, [t for t, _ in cuts], has_gate)
         face = outline.add(place(tunnel, tunnel.outer_radius, ring.theta))
+        for k, (_, y) in zip(ring.cuts, cuts, strict=True):
+            outline.nodes[face[k], 1] = y  # but for round-off it is
         outline.outer.append(face)
         outline.theta.append(ring.theta)
         count = rows_that_fit(scene, i, lines, rows)
@@ -441,7 +443,7 @@ def _draw_ground(scene, outline, lines, rings, edges):
     for k, y in enumerate(lines, start=1):
         met = []
         for ring, edge in zip(rings, edges, strict=True):
-            at = [edge[i] for i in ring.cuts if abs(outline.nodes[edge[i], 1] - y) < 1e-12]
+            at = [edge[i] for i in ring.cuts if outline.nodes[edge[i], 1] == y]
             met += at
         met.sort(key=lambda node: outline.nodes[node, 0])
         ends = [*([left[k]] if left[k] >= 0 else []), *met, right[k]]
