@@ -11,7 +11,7 @@ from mpm.element_size import element_size
 from mpm.filling import crossing, fill_faces, relax
 from mpm.half_model import with_mirror_image
 from mpm.mesh import Mesh, MeshError, altitudes
-from mpm.outline import Outline, draw_headroom, draw_scene
+from mpm.outline import Outline, draw_headroom, draw_scene, horizontal_lines
 from mpm.scene import Scene
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def build_mesh(scene: Scene) -> Mesh:
     assert best is not None
     lowest, where, outline, cells = best
     if lowest < MIN_RELATIVE_ALTITUDE:
-        size = float(element_size(scene, *where))
+        size = float(_size(scene, where[None])[0])
         raise MeshError(
             f"mesh: the flattest triangle must be at least {MIN_RELATIVE_ALTITUDE:g} element sizes high, got "
             f"{lowest:.2g} ({lowest * size:.2g} m, flattest near x = {where[0]:.2f} m, y = {where[1]:.2f} m); "
@@ -66,6 +66,14 @@ def build_mesh(scene: Scene) -> Mesh:
         )
     mesh = _assemble(scene, outline, cells)
     return with_mirror_image(mesh) if scene.is_half else mesh
+
+
+def _size(scene: Scene, place: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Cell size asked for at (n, 2) places [m]: at most half the distance of the lines above and below, for two rows."""
+    size = element_size(scene, place[:, 0], place[:, 1])
+    levels = np.array([-scene.box.depth, *horizontal_lines(scene)[::-1], 0.0])
+    gap = np.concatenate([[math.inf], np.diff(levels), [math.inf]])
+    return np.minimum(size, gap[np.searchsorted(levels, place[:, 1])] / 2)
 
 
 def _is_regular(outline: Outline) -> bool:
@@ -84,8 +92,7 @@ def _cells(scene: Scene, outline: Outline, algorithm: int) -> NDArray[np.int64]:
     cells = np.concatenate(outline.cells)
     turned = _area(outline.nodes[cells]) < 0
     cells[turned] = cells[turned][:, ::-1]
-    centre = outline.nodes[cells].mean(axis=1)
-    size = element_size(scene, centre[:, 0], centre[:, 1]) ** 2
+    size = _size(scene, outline.nodes[cells].mean(axis=1)) ** 2
     outline.nodes = relax(outline.nodes, outline.free, cells, size, ITERATIONS)
     beside = len(cells)
     outline.cells = [cells]
@@ -113,7 +120,7 @@ def _flattest(scene: Scene, nodes: NDArray[np.float64], cells: NDArray[np.int64]
     """Smallest altitude over the size asked for, and the place of that triangle."""
     points, triangles = _crossed(nodes, cells)
     middle = points[triangles].mean(axis=1)
-    relative = altitudes(points, triangles) / element_size(scene, middle[:, 0], middle[:, 1])
+    relative = altitudes(points, triangles) / _size(scene, middle)
     relative = np.nan_to_num(relative, nan=-1.0)
     worst = int(relative.argmin())
     return float(relative[worst]), nodes[cells[worst // 4]].mean(axis=0)
