@@ -24,7 +24,7 @@ SOFTNESS = 0.05
 WEIGHT, POWER = 2.0, 3
 # Altitudes that are high enough: shares of the size asked for there and of the smallest one; in a square it is 0.5. The
 # smallest elements set the time step of all, so more is asked of them.
-ENOUGH, SWEEPS = (0.4, 0.1), 20
+ENOUGH, SWEEPS = (0.3, 0.13), 20
 SYSTEM_PACKAGES = "libglu1-mesa libgl1 libxrender1 libxcursor1 libxft2 libxinerama1 libgomp1"
 
 

@@ -69,7 +69,7 @@ def build_mesh(scene: Scene) -> Mesh:
 
 
 def _size(scene: Scene, place: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cell size asked for at (n, 2) places [m]: at most half the distance of the lines above and below, for two rows."""
+    """Cell size asked for at (n, 2) places [m]: at most half the distance of the lines around it, for two rows."""
     size = element_size(scene, place[:, 0], place[:, 1])
     levels = np.array([-scene.box.depth, *horizontal_lines(scene)[::-1], 0.0])
     gap = np.concatenate([[math.inf], np.diff(levels), [math.inf]])
