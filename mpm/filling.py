@@ -84,7 +84,9 @@ def fill_faces(scene: Scene, outline: Outline, algorithm: int) -> None:
 
 def _draw(gmsh: Any, outline: Outline) -> tuple[dict[int, int], list[int]]:
     """Every second node of the lines and one line from each to the next; gmsh points of nodes, and surfaces."""
-    geo, tags, lines = gmsh.model.geo, {}, {}
+    geo = gmsh.model.geo
+    tags: dict[int, int] = {}
+    lines: dict[tuple[int, int], int] = {}
 
     def point(node: int) -> int:
         if node not in tags:

@@ -217,7 +217,7 @@ _NODE_SETS = (
 )  # fmt: skip
 
 
-def altitudes(nodes: NDArray[np.float64], elements: NDArray[np.int32]) -> NDArray[np.float64]:
+def altitudes(nodes: NDArray[np.float64], elements: NDArray[np.integer]) -> NDArray[np.float64]:
     """Smallest altitude of each triangle [m], shape (m,): twice the area over the longest edge."""
     corner = nodes[elements]
     edge = np.roll(corner, -1, axis=1) - corner
@@ -225,13 +225,13 @@ def altitudes(nodes: NDArray[np.float64], elements: NDArray[np.int32]) -> NDArra
     return 2 * areas(nodes, elements) / longest
 
 
-def areas(nodes: NDArray[np.float64], elements: NDArray[np.int32]) -> NDArray[np.float64]:
+def areas(nodes: NDArray[np.float64], elements: NDArray[np.integer]) -> NDArray[np.float64]:
     """Area of each triangle [m2], shape (m,), positive when counter-clockwise."""
     a, b, c = (nodes[elements[:, i]] for i in range(3))
     return 0.5 * ((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1]))
 
 
-def angles(nodes: NDArray[np.float64], elements: NDArray[np.int32]) -> NDArray[np.float64]:
+def angles(nodes: NDArray[np.float64], elements: NDArray[np.integer]) -> NDArray[np.float64]:
     """Angles of each triangle at its nodes [rad], shape (m, 3)."""
     corner = nodes[elements]
     forward = np.roll(corner, -1, axis=1) - corner

@@ -45,17 +45,23 @@ def build_mesh(scene: Scene) -> Mesh:
         When a triangle would be much flatter than the size asked for, or gmsh or its system libraries fail.
     """
     best: tuple[float, NDArray[np.float64], Outline, NDArray[np.int64]] | None = None
+    failure = MeshError("mesh: channel and rows along the linings must not fold, got none that fit; refine the linings")
     for rows, algorithm in ATTEMPTS:
         outline = draw_scene(scene, rows)
         if not _is_regular(outline):
             continue
-        cells = _cells(scene, outline, algorithm)
+        try:
+            cells = _cells(scene, outline, algorithm)
+        except MeshError as error:
+            failure = error
+            continue
         lowest, where = _flattest(scene, outline.nodes, cells)
         if best is None or lowest > best[0]:
             best = lowest, where, outline, cells
         if lowest >= GOOD_ALTITUDE:
             break
-    assert best is not None
+    if best is None:
+        raise failure
     lowest, where, outline, cells = best
     if lowest < MIN_RELATIVE_ALTITUDE:
         size = float(_size(scene, where[None])[0])
@@ -94,11 +100,10 @@ def _cells(scene: Scene, outline: Outline, algorithm: int) -> NDArray[np.int64]:
     cells[turned] = cells[turned][:, ::-1]
     size = _size(scene, outline.nodes[cells].mean(axis=1)) ** 2
     outline.nodes = relax(outline.nodes, outline.free, cells, size, ITERATIONS)
-    beside = len(cells)
     outline.cells = [cells]
     draw_headroom(scene, outline)
     cells = np.concatenate(outline.cells)
-    turned = np.flatnonzero(_area(outline.nodes[cells[beside:]]) < 0) + beside
+    turned = _area(outline.nodes[cells]) < 0
     cells[turned] = cells[turned][:, ::-1]
     return cells
 

@@ -18,16 +18,13 @@ from mpm.mesh import CHANNEL, HEADROOM, INTERIOR, SOIL, MeshError
 from mpm.scene import Scene, Tunnel
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import ArrayLike, NDArray
 
     Nodes = NDArray[np.int64]
 
 # Samples of the element size along a line that is divided.
 SAMPLES = 2001
-# A water table closer than this to a soil layer boundary or the surface, in element sizes there, is no mesh line: the
-# cells between the two would be flatter than a kink of the pore pressure inside a cell is wrong.
+# A water table closer than this to a soil layer boundary, surface or bottom, in element sizes, is no mesh line.
 NEAR_LINE = 1.5
 
 
@@ -75,9 +72,8 @@ class Outline:
         self.region += [region] * len(cells)
 
 
-def place(tunnel: Tunnel, radius: ArrayLike, theta: ArrayLike) -> NDArray[np.float64]:
+def place(tunnel: Tunnel, radius: float | NDArray[np.float64], theta: NDArray[np.float64]) -> NDArray[np.float64]:
     """Positions at angles [deg] about a tunnel's axis; those of a multiple of 90 degrees are exact."""
-    theta = np.asarray(theta, float)
     rad = np.radians(theta)
     sine, cosine = np.sin(rad), np.cos(rad)
     sine = np.where(np.mod(theta, 180.0) == 0, 0.0, sine)
@@ -263,8 +259,8 @@ def horizontal_lines(scene: Scene) -> list[float]:
     """Heights [m, downward] of soil layer boundaries, and of the water table where it is a mesh line of its own.
 
     The table is left out where it lies closer to a layer boundary, to the surface or to the bottom than `NEAR_LINE`
-    element sizes, or where it touches a tunnel near crown or invert, or beside its gate: a kink of the pore pressure
-    inside a cell does less harm than flat cells.
+    element sizes, within a third of a tunnel's radius (or four of the lining's elements) of its crown or invert, or
+    beside its gate: a kink of the pore pressure inside a cell does less harm than flat cells.
     """
     layers = [-soil.top_depth for soil in scene.soils[1:]]
     if scene.water is None:
@@ -274,7 +270,7 @@ def horizontal_lines(scene: Scene) -> list[float]:
         return layers
     for i, tunnel in enumerate(scene.tunnels):
         rise, radius = table + tunnel.axis_depth, tunnel.outer_radius
-        if abs(abs(rise) - radius) < max(0.35 * radius, 4 * scene.discretisation.element_size_lining):
+        if abs(abs(rise) - radius) < max(radius / 3, 4 * scene.discretisation.element_size_lining):
             return layers
         if (
             abs(rise) < radius
@@ -335,7 +331,7 @@ def draw_scene(scene: Scene, rows: int) -> Outline:
     for i, tunnel in enumerate(scene.tunnels):
         has_gate = scene.gate is not None and scene.gate.tunnel == i
         cut = [y for y in lines if abs(y + tunnel.axis_depth) < tunnel.outer_radius]
-        if has_gate:
+        if has_gate and scene.gate is not None:
             for y in cut:
                 if _meets_gate(scene, tunnel, y):
                     raise MeshError(
@@ -461,6 +457,3 @@ def draw_headroom(scene: Scene, outline: Outline) -> None:
         row[:, 1] = height * k / pieces if k < pieces else height
         rows.append(outline.add(row))
     outline.add_grid(np.stack(rows), HEADROOM)
-
-
-__all__: Sequence[str] = ("Face", "Outline", "draw_headroom", "draw_scene", "horizontal_lines", "place")
