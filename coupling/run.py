@@ -99,17 +99,33 @@ def _teller(warn):
 
 
 def finish(scene, folder, progress):
-    """Response of the ring to a run's pressures and all pictures; returns the paths of the pictures."""
-    from coupling.figures import draw_run
+    """Response of the ring to a run's pressures and all pictures; returns the paths of the pictures.
 
+    Raises
+    ------
+    RunRefused, structure.LiningFailure
+        As :func:`respond`, after the pictures of the ground have been drawn.
+    """
+    from coupling.figures import draw_run
+    from structure import LiningFailure
+
+    failure = None
     if scene.ring is not None and scene.mpm.tunnels:
         progress({"stage": "respond"})
-        response = respond(scene, read_pressures(folder))
-        write_response(folder / RUN_FILE, response)
-        respond_beside(scene, folder)
-        write_quality(folder / RUN_FILE, response)
+        try:
+            response = respond(scene, read_pressures(folder))
+            write_response(folder / RUN_FILE, response)
+            respond_beside(scene, folder)
+            write_quality(folder / RUN_FILE, response)
+        except (RunRefused, LiningFailure) as error:
+            log.error("no response of the ring: %s", error)
+            error.add_note(f"the ground is computed: its pressures and pictures are in {folder}")
+            failure = error
     progress({"stage": "figures"})
-    return draw_run(folder, folder / FIGURES)
+    pictures = draw_run(folder, folder / FIGURES)
+    if failure is not None:
+        raise failure
+    return pictures
 
 
 def respond(scene, pressures, backend="beam-spring"):

@@ -334,10 +334,13 @@ class Solver(Measures):
         return steps, residual
 
     def open_gate(self):
-        """Take the plug away: the opening is free, its corners stand still or belong to the channel walls."""
+        """Take the plug away: the opening is free, its corners stand still or belong to the channel walls.
+
+        Without a gate in the scene the lining stays whole.
+        """
         self.normal = self._normal_open
         self.active = self._active_open
-        if self.scene.gate.corners == "held":
+        if self.scene.gate is not None and self.scene.gate.corners == "held":
             self.fixed[self.mesh.corner_nodes] |= FIXED_X | FIXED_Y
         self.gate_open = True
 
