@@ -4,6 +4,7 @@ import math
 import time as clock
 
 from coupling.run import check_memory, free_memory_bytes
+from coupling.scene import as_scene
 
 WARM_UP_STEPS, MEASURED_SPELLS, SECONDS_A_SPELL = 10, 5, 0.3
 # Inflow of grains over that of free discharge under the head at the gate, from runs of case 3 (docs/case-3.md): a rough
@@ -16,7 +17,8 @@ def plan(scene, threads=None):
 
     Parameters
     ----------
-    scene : coupling.Scene
+    scene : coupling.Scene, str or path
+        As of :func:`coupling.run`.
     threads : int or None
 
     Returns
@@ -30,6 +32,7 @@ def plan(scene, threads=None):
     """
     import mpm
 
+    scene = as_scene(scene)
     check_memory(scene.mpm)
     mesh = mpm.build_mesh(scene.mpm)
     solver = mpm.Solver(scene.mpm, mesh, threads)
@@ -65,7 +68,8 @@ def rough_plan(scene):
 
     Parameters
     ----------
-    scene : coupling.Scene
+    scene : coupling.Scene, str or path
+        As of :func:`coupling.run`.
 
     Returns
     -------
@@ -79,6 +83,7 @@ def rough_plan(scene):
     coupling.run_folder.RunRefused
         Too little memory.
     """
+    scene = as_scene(scene)
     check_memory(scene.mpm)
     s = scene.mpm
     elements, time = s.estimated_elements, expected_time(s)

@@ -74,6 +74,7 @@ def _has_lining(file):
 
 def _ring(file, root, scene):
     from structure import Ring
+    from structure.inputs import mistakes, refusal
 
     if scene is not None:
         if scene.ring is None:
@@ -87,4 +88,5 @@ def _ring(file, root, scene):
     try:
         return Ring.model_validate_json(root.attrs["ring"])
     except ValidationError as problem:
-        raise RunFileError(f"'{file}': attribute 'ring' must describe a structure.Ring, got: {problem}") from problem
+        told = refusal("structure.Ring", mistakes(problem, Ring))
+        raise RunFileError(f"'{file}': attribute 'ring' must describe a ring: {told}") from None

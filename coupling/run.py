@@ -2,6 +2,8 @@
 
 import contextlib
 import logging
+import numbers
+import os
 
 from coupling.checkpoint import remove_checkpoints
 from coupling.datasets import read_pressures, write_response
@@ -9,6 +11,8 @@ from coupling.plausibility import warnings_of
 from coupling.recorded_simulation import RecordedSimulation, write_quality
 from coupling.resume import find_remains
 from coupling.run_folder import FIGURES, LOG_FILE, RUN_FILE, RunRefused, claimed, default_folder, reopened
+from coupling.scene import as_scene
+from mpm.threads import check_threads
 
 BYTES_PER_ELEMENT = 2000  # points, buffers and the copy made while sorting, of a case with 3 points an element
 
@@ -23,8 +27,9 @@ def run(
 
     Parameters
     ----------
-    scene : coupling.Scene or None
-        From :func:`coupling.load_scene`. None: that of the run to resume.
+    scene : coupling.Scene, str, path or None
+        A scene, which is validated once more (`model_copy` does not), or what :func:`coupling.load_scene` takes: the
+        name of a built-in one, or a file. None: that of the run to resume.
     out : str, path or None
         Folder for `run.nc` (written as the run goes on), `mesh.vtu`, `scene.toml`, `run.log` and `figures/`.
         None: `runs/<scene>` in the current folder, numbered when that one is taken.
@@ -51,9 +56,11 @@ def run(
 
     Raises
     ------
+    coupling.SceneError
+        Not a scene, or one that can not be run.
     RunRefused
         Before anything starts: folder in use, not writable, not empty; too little memory; nothing to resume, or with
-        another scene or version.
+        another scene or version; arguments of a wrong type.
     mpm.RunFailed
         Non-finite values or no initial equilibrium; the file stays readable, with status 'failed'.
     KeyboardInterrupt
@@ -61,11 +68,13 @@ def run(
     OSError
         Disk full, for instance; the same.
     """
+    _check_arguments(out, progress, threads, checkpoint_interval, warn)
     if resume and (out is None or overwrite):
         raise RunRefused("--resume: needs the folder of the run, and no --overwrite; give it as --out DIR")
+    scene = None if scene is None else as_scene(scene)
     if not resume:
         if scene is None:
-            raise RunRefused("scene: must be given unless a run is resumed; load one with coupling.load_scene")
+            raise RunRefused("scene: must be given unless a run is resumed; name a built-in one, as 'quick'")
         check_memory(scene.mpm)
         out = default_folder(scene.name) if out is None else out
     report = progress if progress is not None else lambda state: None
@@ -87,6 +96,22 @@ def run(
         pressures = read_pressures(folder)
     pressures.attrs |= {"run": str(folder), "scene_name": scene.name}
     return pressures
+
+
+def _check_arguments(out, progress, threads, checkpoint_interval, warn):
+    try:
+        check_threads(threads)
+    except ValueError as problem:
+        raise RunRefused(str(problem)) from None
+    if out is not None and not isinstance(out, str | os.PathLike):
+        raise RunRefused(f"out: must be the path of a folder, got {out!r}; leave it out for runs/SCENE")
+    for name, function in (("progress", progress), ("warn", warn)):
+        if function is not None and not callable(function):
+            raise RunRefused(f"{name}: must be a function, got {function!r}; give one that takes what it is told")
+    if isinstance(checkpoint_interval, bool) or not isinstance(checkpoint_interval, numbers.Real):
+        raise RunRefused(f"checkpoint_interval: must be a number of seconds, got {checkpoint_interval!r}; give e.g. 60")
+    if not checkpoint_interval >= 0:
+        raise RunRefused(f"checkpoint_interval: must not be negative, got {checkpoint_interval!r} s; give e.g. 60")
 
 
 def _teller(warn):

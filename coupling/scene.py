@@ -8,7 +8,6 @@ tunnel with the gate, ``[ring.ground]`` from the soil at that tunnel's axis (see
 import difflib
 import json
 import math
-import reprlib
 import tomllib
 from functools import cached_property
 from importlib import resources
@@ -16,11 +15,12 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import BaseModel, ValidationError, model_validator
 
 from coupling.plausibility import hints, shown
 from coupling.scene_lines import holds, line_of, path_of
 from mpm.scene import Scene as MpmScene
+from structure.inputs import Input, InputError, mistakes, models_in, shortened
 from structure.ring import Ring
 
 # No scene is longer; a larger file is something else.
@@ -28,6 +28,7 @@ MOST_BYTES = 1_000_000
 # The deepest key of a scene is ring.ground.law; what is much deeper is no scene and would overflow the stack.
 MOST_LEVELS = 12
 CHANGES = "changes in Python"
+ADVICE = "no default, see the built-in case-3 for an example"
 # Keys of [ring] and [ring.ground] that follow from the ground when left out.
 DERIVED = (
     "outer_diameter",
@@ -41,7 +42,7 @@ DERIVED = (
 )
 
 
-class SceneError(ValueError):
+class SceneError(InputError):
     """A scene that can not be run: rule, name, value, remedy, one line a mistake."""
 
 
@@ -56,10 +57,8 @@ class Layer(NamedTuple):
     data: dict[str, Any]
 
 
-class Scene(BaseModel):
+class Scene(Input):
     """A complete scene: `mpm` for the ground and the gate, `ring` for the structure (None: no ring is computed)."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     mpm: MpmScene
     ring: Ring | None = None
@@ -72,10 +71,34 @@ class Scene(BaseModel):
     @cached_property
     def source(self) -> str:
         """The scene as TOML text, complete: every number, defaults included, without a base."""
-        data = self.mpm.model_dump(exclude_none=True)
+        head = f"# Scene '{self.name}', complete, in SI units and degrees.\n"
+        return head + "\n".join(_toml_lines(self.nested())) + "\n"
+
+    def nested(self) -> dict[str, Any]:
+        """The scene as the nested dictionary of its complete TOML file, for :func:`make_scene`."""
+        data = self.mpm.model_dump(exclude_none=True, warnings=False)
         if self.ring is not None:
-            data["ring"] = self.ring.model_dump(exclude_none=True)
-        return f"# Scene '{self.name}', complete, in SI units and degrees.\n" + "\n".join(_toml_lines(data)) + "\n"
+            data["ring"] = self.ring.model_dump(exclude_none=True, warnings=False)
+        return data
+
+    def changed(self, **changes: Any) -> "Scene":
+        """The scene with other values, validated; what of the ring follows from the ground follows it again.
+
+        Parameters
+        ----------
+        **changes
+            As of :func:`load_scene`: ``scene.changed(stop={"inflow_mass": 50.0})``.
+
+        Raises
+        ------
+        SceneError
+            Invalid values; every mistake found is named.
+        """
+        data = self.nested()
+        if "ring" in data:
+            data["ring"] = _without(data["ring"], derived_ring(self.mpm))
+        _check_levels(changes, f"changes of scene {self.name!r}")
+        return make_scene(_merge(data, changes), self.name)
 
     @model_validator(mode="after")
     def _check(self) -> "Scene":
@@ -143,6 +166,31 @@ def read_scene_data(name: str | Path) -> dict[str, Any]:
     return _merged(_read(str(name), ()))
 
 
+def as_scene(scene: Any) -> Scene:
+    """A valid scene from what a caller has: a scene, which is validated once more, or the name or file of one.
+
+    Raises
+    ------
+    SceneError
+        As :func:`load_scene`; or what is given is neither.
+    """
+    if isinstance(scene, str | Path):
+        return load_scene(scene)
+    if isinstance(scene, MpmScene):
+        raise SceneError(
+            f"scene '{scene.name}': must be a coupling.Scene, got its part for the ground, an mpm.Scene; "
+            "give coupling.Scene(mpm=..), with ring=.. where forces in the ring are wanted"
+        )
+    if isinstance(scene, dict):
+        return make_scene(scene)
+    if not isinstance(scene, Scene):
+        raise SceneError(
+            f"scene: must be a coupling.Scene, the name of a built-in one or a file, got {shortened(scene)}; "
+            "load one: coupling.load_scene('quick')"
+        )
+    return make_scene(scene.nested(), str(getattr(scene.mpm, "name", "scene")))
+
+
 def parse_scene(text: str, origin: str) -> Scene:
     """A scene from the complete TOML text that a run stores.
 
@@ -161,7 +209,7 @@ def make_scene(data: dict[str, Any], origin: str = "scene", layers: tuple[Layer,
     Parameters
     ----------
     data : dict
-        Tables ``box``, ``water``, ``soils`` .. of `mpm.Scene`, and ``ring`` of `structure.Ring`.
+        Tables ``box``, ``water``, ``soils`` .. of `mpm.Scene`, ``ring`` of `structure.Ring`, and ``base`` as in a file.
     origin : str
         What the message of an error starts with.
     layers : tuple of Layer
@@ -178,6 +226,10 @@ def make_scene(data: dict[str, Any], origin: str = "scene", layers: tuple[Layer,
             "give the nested dictionary of its TOML file"
         )
     _check_levels(data, f"scene {origin!r}")
+    if "base" in data:
+        below = _read_base(data["base"], origin, ())
+        data = _merge(_merged(below), {key: value for key, value in data.items() if key != "base"})
+        layers = (*layers, *below)
     whole, data = data, dict(data)
     ring_data = data.pop("ring", None)
     problems = _truth_values(data, MpmScene, ())
@@ -187,22 +239,25 @@ def make_scene(data: dict[str, Any], origin: str = "scene", layers: tuple[Layer,
     try:
         mpm_scene = MpmScene.model_validate(data)
     except ValidationError as error:
-        problems += _messages(error, MpmScene, (), extra_names=("ring", "base"))
+        problems += mistakes(error, MpmScene, extra_names=("ring", "base"), advice=ADVICE)
     if ring_data is not None:
         if not isinstance(ring_data, dict):
-            problems.append((("ring",), f"must be a table, got {_short(ring_data)}; write [ring] with its keys below"))
+            problems.append(
+                (("ring",), f"must be a table, got {shortened(ring_data)}; write [ring] with its keys below")
+            )
         else:
             derived = {} if mpm_scene is None else derived_ring(mpm_scene)
             try:
                 ring = Ring.model_validate(_merge(derived, ring_data))
             except ValidationError as error:
                 # Without a valid ground there is nothing to derive the missing keys from.
-                problems += _messages(error, Ring, ("ring",), silent=() if derived else DERIVED)
+                found = mistakes(error, Ring, silent=() if derived else DERIVED, advice=ADVICE)
+                problems += [(("ring", *location), message) for location, message in found]
     if not problems and mpm_scene is not None:
         try:
-            return Scene(mpm=mpm_scene, ring=ring)
+            return Scene.model_validate({"mpm": mpm_scene, "ring": ring})
         except ValidationError as error:
-            problems += _messages(error, Scene, ())
+            problems += mistakes(error, Scene)
     unusual = hints(whole)
     lines = [f"scene {origin!r} has {len(problems)} mistake{'s' * (len(problems) > 1)}:"]
     lines += [_line(location, message, whole, origin, layers, unusual) for location, message in problems]
@@ -268,13 +323,18 @@ def _read(name: str, chain: tuple[str, ...]) -> tuple[Layer, ...]:
     layer = Layer(name, text, data)
     if base is None:
         return (layer,)
+    return (layer, *_read_base(base, name, chain))
+
+
+def _read_base(base: Any, name: str, chain: tuple[str, ...]) -> tuple[Layer, ...]:
+    """The texts of the base that the scene `name` states."""
     if not isinstance(base, str):
         raise SceneError(
-            f"scene {name!r}: base must be the name or file of a scene, got {_short(base)}; write base = 'case-3'"
+            f"scene {name!r}: base must be the name or file of a scene, got {shortened(base)}; write base = 'case-3'"
         )
     # A file's base is looked up beside it, wherever the program was started.
     beside = Path(name).parent / base
-    return (layer, *_read(base if base in scene_names() or not _is_there(beside) else str(beside), (*chain, name)))
+    return _read(base if base in scene_names() or not _is_there(beside) else str(beside), (*chain, name))
 
 
 def _merged(layers: tuple[Layer, ...]) -> dict[str, Any]:
@@ -327,7 +387,7 @@ def _read_file(name: str) -> str:
         near = difflib.get_close_matches(name, scene_names(), 1)
         hint = f"did you mean {near[0]!r}? " if near else ""
         raise SceneError(
-            f"scene {_short(name)}: must be a built-in scene or a file, got neither; {hint}"
+            f"scene {shortened(name)}: must be a built-in scene or a file, got neither; {hint}"
             f"built-in: {', '.join(scene_names())}"
         )
     return read_toml_file(path, f"scene {name!r}")
@@ -359,6 +419,17 @@ OPTIONAL_TABLES = ("water", "gate", "ring")
 NONE = "none"
 
 
+def _without(table: dict[str, Any], derived: dict[str, Any]) -> dict[str, Any]:
+    """A table less the entries that only say what is derived anyway."""
+    kept = {}
+    for key, value in table.items():
+        if isinstance(value, dict) and isinstance(derived.get(key), dict):
+            kept[key] = _without(value, derived[key])
+        elif key not in derived or value != derived[key]:
+            kept[key] = value
+    return kept
+
+
 def _merge(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     merged = dict(base)
     for key, value in changes.items():
@@ -368,13 +439,6 @@ def _merge(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
         both = isinstance(value, dict) and isinstance(merged.get(key), dict)
         merged[key] = _merge(merged[key], value) if both else value
     return merged
-
-
-def _short(value: Any) -> str:
-    """A value as a message shows it, never long."""
-    shortened = reprlib.Repr()
-    shortened.maxstring = shortened.maxother = shortened.maxlong = 60
-    return shortened.repr(value)
 
 
 def _line(
@@ -419,7 +483,7 @@ def _truth_values(data: Any, model: type[BaseModel], location: tuple[Any, ...]) 
         field, where = model.model_fields.get(key) if isinstance(key, str) else None, (*location, key)
         if field is None:
             continue
-        inner = next(_models_in(field.annotation), None)
+        inner = next(models_in(field.annotation), None)
         entries = enumerate(value) if isinstance(value, list | tuple) else [(None, value)]
         for index, entry in entries:
             at = where if index is None else (*where, index)
@@ -428,95 +492,6 @@ def _truth_values(data: Any, model: type[BaseModel], location: tuple[Any, ...]) 
             elif inner is not None:
                 found += _truth_values(entry, inner, at)
     return found
-
-
-def _messages(
-    error: ValidationError,
-    model: type[BaseModel],
-    prefix: tuple[Any, ...],
-    *,
-    silent: tuple[str, ...] = (),
-    extra_names: tuple[str, ...] = (),
-) -> list[tuple[tuple[Any, ...], str]]:
-    """Location and message of every mistake: rule, value, remedy."""
-    found = []
-    missing: dict[tuple[Any, ...], list[str]] = {}
-    for item in error.errors(include_url=False):
-        if item["type"] == "missing":
-            if item["loc"][-1] not in silent:
-                missing.setdefault(item["loc"][:-1], []).append(str(item["loc"][-1]))
-            continue
-        if item["type"] == "too_short" and item["input"]:
-            # Only the echo of the mistakes inside its entries.
-            continue
-        found.append(((*prefix, *item["loc"]), _message(item, model, extra_names)))
-    advice = "no default, see the built-in case-3 for an example"
-    for name in missing.pop((), []):
-        found.append(((*prefix, name), f"missing; it decides the answer and has {advice}"))
-    for table, names in missing.items():
-        # A soil is where newcomers change one number and lose the others.
-        whole = (
-            f"; [[{table[0]}]] replaces all {table[0]} of the base, so copy all keys of it" if len(table) > 1 else ""
-        )
-        them = "it decides the answer and has" if len(names) == 1 else "they decide the answer and have"
-        text = f"{', '.join(names)} missing; {them} {advice}{whole}"
-        found.append(((*prefix, *table), text))
-    return found
-
-
-def _message(item: Any, model: type[BaseModel], extra_names: tuple[str, ...]) -> str:
-    kind, value = item["type"], item["input"]
-    if kind == "extra_forbidden":
-        here = [*_names_at(model, item["loc"][:-1]), *(extra_names if len(item["loc"]) == 1 else ())]
-        near = difflib.get_close_matches(str(item["loc"][-1]), here, 1)
-        return f"unknown key, got {_short(value)}; " + (
-            f"did you mean {near[0]!r}?" if near else f"known: {', '.join(here)}"
-        )
-    message = item["msg"].removeprefix("Value error, ")
-    if kind == "value_error":
-        return message
-    rule = message.replace("Input should", "must", 1)
-    if kind in ("model_type", "dict_type"):
-        rule = "must be a table"
-    limits = item.get("ctx", {})
-    given = _short(value) if isinstance(value, str | int | float) else f"a {type(value).__name__}"
-    if kind == "too_short":
-        return f"must have at least {limits['min_length']} entry, got {_short(value)}; add one"
-    if kind == "too_long":
-        return f"must have at most {limits['max_length']} entries, got {len(value)}; merge or leave out some"
-    if kind == "string_pattern_mismatch":
-        return f"must be letters, digits and the like, beginning with a letter or digit, got {given}; rename it"
-    if kind == "literal_error" and isinstance(value, str):
-        near = difflib.get_close_matches(value.lower(), limits["expected"].replace("'", "").split(" or "), 1)
-        return f"{rule}, got {given}; " + (f"did you mean {near[0]!r}?" if near else "choose one of these")
-    remedy = next(
-        (f"give a value {sign} {limits[key]:g}" for key, sign in _LIMITS.items() if key in limits), "correct it"
-    )
-    if kind == "float_parsing":
-        remedy = "give a plain number"
-    return f"{rule}, got {given}; {remedy}"
-
-
-_LIMITS = {"gt": "above", "ge": "from", "lt": "below", "le": "up to"}
-
-
-def _names_at(model: type[BaseModel], location: tuple[Any, ...]) -> list[str]:
-    """Keys known in the table at `location`."""
-    for part in location:
-        if isinstance(part, int):
-            continue
-        models = list(_models_in(model.model_fields[part].annotation))
-        if not models:
-            return []
-        model = models[0]
-    return list(model.model_fields)
-
-
-def _models_in(annotation: Any) -> Any:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    for argument in getattr(annotation, "__args__", ()):
-        yield from _models_in(argument)
 
 
 def _toml_lines(data: dict[str, Any], path: str = "") -> list[str]:

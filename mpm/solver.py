@@ -52,7 +52,7 @@ from mpm.points import (
 )
 from mpm.spectrum import Spectrum, spectral_time_step
 from mpm.tables import element_geometry, element_neighbours, outflow_nodes, soil_table
-from mpm.threads import Threads
+from mpm.threads import Threads, check_threads
 from mpm.time_step import dry_wave_speed, fast_wave_speed
 from mpm.transfer import advance_kernel, rates_kernel, update_kernel
 from mpm.variables import (
@@ -104,6 +104,7 @@ class Solver(Measures):
     """
 
     def __init__(self, scene, mesh, threads=None):
+        check_threads(threads)
         if scene.is_half:
             mesh = right_half(mesh)
         self.copies = 2 if scene.is_half else 1  # of what is computed, in the whole

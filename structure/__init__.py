@@ -8,6 +8,7 @@ from importlib import import_module
 _HOMES = {
     "Ring": "structure.ring",
     "Ground": "structure.ring",
+    "InputError": "structure.inputs",
     "LiningModel": "structure.lining",
     "LiningFailure": "structure.lining",
     "additional": "structure.lining",

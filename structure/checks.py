@@ -9,8 +9,9 @@ from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, ValidationError, model_validator
 
+from structure.inputs import Input, InputError, mistakes, refusal
 from structure.sections import SegmentSection, interaction, moment_utilisation, radial_utilisation
 
 #: name: what it is, for figures and tables.
@@ -22,7 +23,7 @@ UTILISATIONS = {
 }
 
 
-class CapacityRule(BaseModel):
+class CapacityRule(Input):
     """How internal forces are set against the capacity of the section; every value is the user's.
 
     Parameters
@@ -36,15 +37,13 @@ class CapacityRule(BaseModel):
         "constant_axial_force": |M_Ed| over the moment carried at the same N_Ed; infinite beyond the largest N.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
     axial_force_factor: float = Field(gt=0)
     moment_factor: float = Field(gt=0)
     minimum_eccentricity: float = Field(ge=0)
     utilisation: Literal["radial", "constant_axial_force"]
 
 
-class Limits(BaseModel):
+class Limits(Input):
     """Limits of a lining; those left out are not checked, none has a default value.
 
     Parameters
@@ -62,8 +61,6 @@ class Limits(BaseModel):
     convergence_per_mille : float, optional
         Largest change of the horizontal or vertical diameter over the outer diameter [per mille].
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     segment: SegmentSection | None = None
     capacity: CapacityRule | None = None
@@ -84,9 +81,25 @@ class Limits(BaseModel):
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Limits:
-        """Limits from a TOML file with the keys above, tables ``[segment]`` and ``[capacity]``; SI units."""
-        with open(path, "rb") as file:
-            return cls.model_validate(tomllib.load(file))
+        """Limits from a TOML file with the keys above, tables ``[segment]`` and ``[capacity]``; SI units.
+
+        Raises
+        ------
+        structure.InputError
+            No TOML, or no limits: every mistake with key, rule, value and remedy.
+        OSError
+            Not readable.
+        """
+        who = f"limits '{path}'"
+        try:
+            with open(path, "rb") as file:
+                data = tomllib.load(file)
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
+            raise InputError(f"{who}: must be valid TOML, got: {problem}; correct it there") from None
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            raise InputError(refusal(who, mistakes(error, cls))) from None
 
 
 def check(response: xr.Dataset, limits: Limits) -> xr.Dataset:

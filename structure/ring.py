@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
+
+from structure.inputs import Input
 
 
-class Ground(BaseModel):
+class Ground(Input):
     """Soil around the ring, as the soil springs see it.
 
     Parameters
@@ -37,8 +39,6 @@ class Ground(BaseModel):
         Whether normal springs also pull. Off by default: a two-way spring pulls a shrinking ring outward.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
     youngs_modulus: float = Field(gt=0)
     poissons_ratio: float = Field(ge=0, lt=0.5)
     cohesion: float = Field(ge=0)
@@ -53,7 +53,7 @@ class Ground(BaseModel):
     two_way: bool = False
 
 
-class Ring(BaseModel):
+class Ring(Input):
     """A ring of segments, one metre of tunnel.
 
     Parameters
@@ -96,8 +96,6 @@ class Ring(BaseModel):
     section : {"timoshenko", "euler-bernoulli"}
         With or without shear deformation.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     outer_diameter: float = Field(gt=0)
     inner_diameter: float = Field(gt=0)
