@@ -21,6 +21,7 @@ from coupling.journal import changed, put_in_place, readable, recover, replace_f
 from coupling.netcdf_group import read_group_at_once
 from coupling.own_content import ForeignContent, require_own_content
 from coupling.provenance import with_history
+from coupling.run_folder import RUN_FILE, how_to_go_on, in_use
 from mpm.variables import CLAMPS, POINT_VARIABLES
 
 STATUSES = ("running", "finished", "failed", "interrupted")
@@ -485,7 +486,7 @@ def _group_names(file):
 
 
 def read_attributes(path):
-    """Root attributes of a run: provenance, scene text, status."""
+    """Root attributes of a run: provenance, scene text, status ('interrupted' also where its process was killed)."""
     return dict(_read(run_file(path), None).attrs)
 
 
@@ -572,11 +573,19 @@ def _read(file, group, row=None):
             dataset = read_group_at_once(shown, group, complete)
         if "scene_sha256" in dataset.attrs:
             _check_scene(file, dataset.attrs)
-        return dataset
+        return _with_true_status(file, dataset)
     except RunFileError:
         raise
     except Exception as error:
         raise RunFileError(_why_unreadable(file, group, error)) from error
+
+
+def _with_true_status(file, dataset):
+    """The root's status, which a process that was killed could not correct any more."""
+    if dataset.attrs.get("status") != "running" or in_use(file.parent):
+        return dataset
+    go_on = f"; continue with: {how_to_go_on(file.parent)}" if file.name == RUN_FILE else ""
+    return dataset.assign_attrs(status="interrupted", status_message=f"its process is gone{go_on}")
 
 
 def _check_scene(file, attributes):

@@ -149,7 +149,7 @@ os._exit(9)
     pressures = datasets.read_pressures(path)
     assert pressures.sizes["time"] >= 5
     assert np.isfinite(pressures["soil_pressure"]).all()
-    assert datasets.read_attributes(path)["status"] == "running"
+    assert datasets.read_attributes(path)["status"] == "interrupted"
 
 
 def test_batch_cut_short_before_its_times_is_not_shown(tmp_path):

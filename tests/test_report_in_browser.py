@@ -214,7 +214,7 @@ def test_runs_without_ring_or_with_one_record_or_two_tunnels_have_a_page(browser
     browser.complaints.clear()
     one = write_run(tmp_path / "one.nc", times=(0.0,), models=(), status="running")
     browser.open(page.write_report(one, tmp_path / "one.html"))
-    assert "'running'" in browser.evaluate("document.querySelector('.warnings').innerText")
+    assert "'interrupted'" in browser.evaluate("document.querySelector('.warnings').innerText")
     assert browser.evaluate("document.querySelectorAll('#player [data-chart] > svg').length") == 5
     twin = coupling.load_scene("twin-tunnels")
     writer = datasets.RunWriter(tmp_path / "twin.nc", root_attributes(twin), twin.mpm)
