@@ -15,7 +15,7 @@ from coupling.info import describe
 
 def test_killed_run_is_interrupted_and_offers_to_resume(tmp_path):
     scene, out = tmp_path / "small.toml", tmp_path / "run"
-    scene.write_text(small_scene(stop={"time": 4000.0}, output={"interval": 0.005}).source)
+    scene.write_text(small_scene(stop={"time": 4000.0, "inflow_mass": 1e9}, output={"interval": 0.005}).source)
     command = [sys.executable, "-m", "coupling.cli", "run", str(scene), "--out", str(out), "--no-figures"]
     with subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as process:
         try:
