@@ -161,7 +161,7 @@ def plan_command(
         warnings = warnings_of(loaded)
         for warning in warnings:
             warn(warning)
-        data = {**(rough_plan(loaded) if rough else plan(loaded, threads)), "warnings": warnings}
+        data = {**(rough_plan(loaded, threads) if rough else plan(loaded, threads)), "warnings": warnings}
         write_json(json_path, data)
         if str(json_path) != "-":
             console = Console()
@@ -427,7 +427,7 @@ def _feature_table(data):
 
 
 def _cost_table(data):
-    most = "no stop time given" if data["steps_at_most"] is None else f"at most {data['steps_at_most']}"
+    most = "no stop time given" if data["steps_at_most"] is None else f"{data['steps_at_most']} until the stop time"
     table = Table("cost", "", title=f"{data['scene']}: what it costs")
     free = data["free_memory_bytes"]
     meshed = "nodes" in data

@@ -91,6 +91,16 @@ class RunFailed(RuntimeError):
         super().__init__(f"{cause} at t = {time:.6g} s, x = {place[0]:.3f} m, y = {place[1]:.3f} m")
 
 
+def cores():
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+
+
+def threads_used(elements, asked=None):
+    """Number of threads that a mesh of so many elements is computed by, of those asked for (None: all cores)."""
+    return 1 if elements < SMALLEST_PARALLEL else max(1, min(asked or cores(), PARTS))
+
+
 class Solver(Measures):
     """Two-phase MPM on a body-fitted triangle mesh; linings are held or move (`mpm.wall`).
 
@@ -144,8 +154,7 @@ class Solver(Measures):
         self.volume = np.zeros((m, 2))
         self.fill = np.zeros(n_rows)
         self.clock = Clock.of(self.levels)
-        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
-        self.threads = 1 if m < SMALLEST_PARALLEL else max(1, min(threads or cores, PARTS))
+        self.threads = threads_used(m, threads)
         self.workers = Threads(self.threads, PARTS + 1)
         self.clamps = np.zeros((PARTS, len(CLAMPS)), np.int64)
         self.ledger = np.zeros((PARTS, len(LEDGER)))
