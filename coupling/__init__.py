@@ -8,6 +8,7 @@ from importlib import import_module
 from types import ModuleType
 
 _HOMES = {
+    "GushingWarning": "structure.inputs",
     "Scene": "coupling.scene",
     "SceneError": "coupling.scene",
     "load_scene": "coupling.scene",

@@ -154,14 +154,14 @@ def plan_command(
     """
     with failures(), checked_json(json_path):
         from coupling.plan import plan, rough_plan
-        from coupling.plausibility import warnings_of
-        from coupling.scene import load_scene
 
-        loaded = load_scene(scene)
-        warnings = warnings_of(loaded)
-        for warning in warnings:
-            warn(warning)
-        data = {**(rough_plan(loaded, threads) if rough else plan(loaded, threads)), "warnings": warnings}
+        told = []
+
+        def tell(message):
+            told.append(message)
+            warn(message)
+
+        data = {**(rough_plan if rough else plan)(scene, threads, tell), "warnings": told}
         write_json(json_path, data)
         if str(json_path) != "-":
             console = Console()

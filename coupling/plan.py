@@ -5,6 +5,7 @@ import time as clock
 
 import numpy as np
 
+from coupling.plausibility import warn_in_python, warnings_of
 from coupling.run import check_memory, free_memory_bytes
 from coupling.scene import as_scene
 
@@ -14,7 +15,7 @@ WARM_UP_STEPS, MEASURED_SPELLS, SECONDS_A_SPELL = 10, 5, 0.3
 DISCHARGE_SHARE = 0.11
 
 
-def plan(scene, threads=None):
+def plan(scene, threads=None, warn=None):
     """Build the mesh and the points of a scene, take a few steps, and say what the run will cost.
 
     Parameters
@@ -22,6 +23,8 @@ def plan(scene, threads=None):
     scene : coupling.Scene, str or path
         As of :func:`coupling.run`.
     threads : int or None
+    warn : callable or None
+        As of :func:`coupling.run`.
 
     Returns
     -------
@@ -36,6 +39,8 @@ def plan(scene, threads=None):
     import mpm
 
     scene = as_scene(scene)
+    for warning in warnings_of(scene):
+        (warn if warn is not None else warn_in_python)(warning)
     check_memory(scene.mpm)
     mesh = mpm.build_mesh(scene.mpm)
     solver = mpm.Solver(scene.mpm, mesh, threads)
@@ -103,7 +108,7 @@ def _why_alone(elements, asked):
     return "one was asked for" if asked == 1 else "one core" if asked is None and cores() == 1 else ""
 
 
-def rough_plan(scene, threads=None):
+def rough_plan(scene, threads=None, warn=None):
     """What a run would do and cost, from formulas alone: no mesh, no points, some milliseconds.
 
     Parameters
@@ -111,6 +116,8 @@ def rough_plan(scene, threads=None):
     scene : coupling.Scene, str or path
         As of :func:`coupling.run`.
     threads : int or None
+    warn : callable or None
+        As of :func:`coupling.run`.
 
     Returns
     -------
@@ -128,6 +135,8 @@ def rough_plan(scene, threads=None):
     from mpm.threads import check_threads
 
     scene = as_scene(scene)
+    for warning in warnings_of(scene):
+        (warn if warn is not None else warn_in_python)(warning)
     check_memory(scene.mpm)
     check_threads(threads)
     s = scene.mpm

@@ -88,5 +88,5 @@ def _ring(file, root, scene):
     try:
         return Ring.model_validate_json(root.attrs["ring"])
     except ValidationError as problem:
-        told = refusal("structure.Ring", mistakes(problem, Ring))
-        raise RunFileError(f"'{file}': attribute 'ring' must describe a ring: {told}") from None
+        told = refusal("it", mistakes(problem, Ring))
+        raise RunFileError(f"'{file}': attribute 'ring' must describe a structure.Ring: {told}") from None

@@ -3,6 +3,7 @@
 import numpy as np
 
 from coupling.datasets import raw_groups, read_attributes, run_file
+from coupling.plausibility import warn_in_python
 from coupling.provenance import DECISIVE, differences, root_attributes
 from coupling.run import run
 from coupling.run_folder import RunRefused, default_folder
@@ -12,7 +13,7 @@ from coupling.scene import parse_scene
 NOT_COMPARED = {"cpu_seconds"}
 
 
-def rerun(first, out=None, progress=None, threads=None, warn=lambda message: None):
+def rerun(first, out=None, progress=None, threads=None, warn=None):
     """Repeat a run in another folder and compare all that was simulated.
 
     Parameters
@@ -20,8 +21,8 @@ def rerun(first, out=None, progress=None, threads=None, warn=lambda message: Non
     first : str or path
         Folder or run.nc of the run; finished or not.
     out, progress, threads, warn
-        As of :func:`coupling.run`; `out` is ``runs/<scene>-rerun``, numbered, when None. `warn` is told what differs
-        between then and now that the bits may depend on.
+        As of :func:`coupling.run`; `out` is ``runs/<scene>-rerun``, numbered, when None. `warn` is also told what
+        differs between then and now that the bits may depend on.
 
     Returns
     -------
@@ -40,7 +41,7 @@ def rerun(first, out=None, progress=None, threads=None, warn=lambda message: Non
     scene = parse_scene(attributes["scene"], str(file))
     changed = differences(attributes, root_attributes(scene), (*DECISIVE, "gmsh", "processor"))
     for name, (before, now) in changed.items():
-        warn(f"{name}: {before} then, {now} now; results may differ")
+        (warn if warn is not None else warn_in_python)(f"{name}: {before} then, {now} now; results may differ")
     folder = run(
         scene, default_folder(f"{scene.name}-rerun") if out is None else out, False, progress, threads, warn=warn
     ).attrs["run"]

@@ -7,7 +7,7 @@ import os
 
 from coupling.checkpoint import remove_checkpoints
 from coupling.datasets import read_pressures, write_response
-from coupling.plausibility import warnings_of
+from coupling.plausibility import warn_in_python, warnings_of
 from coupling.recorded_simulation import RecordedSimulation, write_quality
 from coupling.resume import find_remains
 from coupling.run_folder import FIGURES, LOG_FILE, RUN_FILE, RunRefused, claimed, default_folder, reopened
@@ -48,6 +48,7 @@ def run(
         Wall time between checkpoints [s].
     warn : callable or None
         Called with what a user should know and the log says too: unusual numbers, damaged files, another processor.
+        None: each is a Python warning, a :class:`structure.GushingWarning`.
 
     Returns
     -------
@@ -117,8 +118,7 @@ def _check_arguments(out, progress, threads, checkpoint_interval, warn):
 def _teller(warn):
     def tell(message):
         log.warning("%s", message)
-        if warn is not None:
-            warn(message)
+        (warn if warn is not None else warn_in_python)(message)
 
     return tell
 

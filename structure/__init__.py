@@ -8,6 +8,7 @@ from importlib import import_module
 _HOMES = {
     "Ring": "structure.ring",
     "Ground": "structure.ring",
+    "GushingWarning": "structure.inputs",
     "InputError": "structure.inputs",
     "LiningModel": "structure.lining",
     "LiningFailure": "structure.lining",

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import difflib
 import reprlib
+import warnings
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError
+
+from structure.plausibility import Usual, unusual
 
 #: Path of a key in nested tables and the message about it.
 Mistake = tuple[tuple[Any, ...], str]
@@ -19,8 +22,15 @@ class InputError(ValueError):
     """Values that an input does not take: rule, name, value, remedy, one line a mistake."""
 
 
+class GushingWarning(UserWarning):
+    """What a user should look at again; the run goes on. All warnings of this program are of this class."""
+
+
 class Input(BaseModel):
     """Base of what users state: frozen; neither unknown keys nor infinite numbers pass."""
+
+    #: Keys whose unusual values are warned of when the input is made in Python: see `structure.plausibility`.
+    usual: ClassVar[Usual] = {}
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -31,9 +41,16 @@ class Input(BaseModel):
                 super().__init__(**values)
             except ValidationError as error:
                 raise InputError(refusal(type(self).__name__, mistakes(error, type(self)))) from None
+            for name, hint in self.unusual().items():
+                warnings.warn(f"{type(self).__name__}.{name} {hint}", GushingWarning, stacklevel=2)
 
         # inner tables are validated with the outer one, whose mistakes then name the whole path
         __init__.__pydantic_base_init__ = True
+
+    def unusual(self) -> dict[str, str]:
+        """Values of another order of magnitude than any that is usual: name to what to think of."""
+        told = {name: unusual(getattr(self, name), *usual) for name, usual in self.usual.items()}
+        return {name: hint for name, hint in told.items() if hint}
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy with other values, validated as a new one is.

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
 from structure.inputs import Input
+from structure.plausibility import GROUND, RING, Usual, joints_in_radians
 
 
 class Ground(Input):
@@ -38,6 +39,8 @@ class Ground(Input):
     two_way : bool
         Whether normal springs also pull. Off by default: a two-way spring pulls a shrinking ring outward.
     """
+
+    usual: ClassVar[Usual] = GROUND
 
     youngs_modulus: float = Field(gt=0)
     poissons_ratio: float = Field(ge=0, lt=0.5)
@@ -97,6 +100,8 @@ class Ring(Input):
         With or without shear deformation.
     """
 
+    usual: ClassVar[Usual] = RING
+
     outer_diameter: float = Field(gt=0)
     inner_diameter: float = Field(gt=0)
     concrete_modulus: float = Field(gt=0)
@@ -139,6 +144,11 @@ class Ring(Input):
         if self.support == "invert" and self.ground is not None:
             raise ValueError("support must be 'free' where there is ground, got 'invert'; remove one of the two")
         return self
+
+    def unusual(self) -> dict[str, str]:
+        """As of every input, and joint angles in radians."""
+        radians = joints_in_radians(self.joint_angles)
+        return super().unusual() | ({"joint_angles": radians} if radians else {})
 
     def _check_joint_laws(self):
         height = self.joint_contact_height
