@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from coupling.main_guard import guard_missing
 from coupling.studies.case import CASE_FILE, run_case
 from coupling.studies.design import Case, Study, StudyError, cases, load_study
 from coupling.studies.progress import StudyState, watching
@@ -99,6 +100,12 @@ def _run(plan, missing, folder, workers, scheduler):
     if scheduler is None and (workers == 0 or len(missing) == 1):
         yield from _in_this_process(plan, missing, folder)
         return
+    script = guard_missing() if scheduler is None else None
+    if script is not None:
+        raise StudyError(
+            f"study '{plan.name}': '{script}' must call it below if __name__ == \"__main__\":, since each of the "
+            "worker processes imports that file first; indent the call below that line, or give workers=0"
+        )
     yield from _on_cluster(plan, missing, folder, workers, scheduler)
 
 
