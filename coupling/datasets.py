@@ -6,6 +6,8 @@ uniform theta grid), `/history` (inflow, zones, balances, time step), `/points` 
 carries attributes only: provenance and `status`.
 """
 
+from __future__ import annotations
+
 import contextlib
 import hashlib
 import io
@@ -13,7 +15,9 @@ import math
 import os
 import shutil
 import time as clock
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +27,12 @@ from coupling.own_content import ForeignContent, require_own_content
 from coupling.provenance import with_history
 from coupling.run_folder import RUN_FILE, how_to_go_on, in_use
 from mpm.variables import CLAMPS, POINT_VARIABLES
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    from mpm.scene import Scene as MpmScene
 
 STATUSES = ("running", "finished", "failed", "interrupted")
 DT_LIMITS = ("acoustic", "advective", "output", "other")
@@ -100,17 +110,17 @@ class RunFileError(ValueError):
 # -- the theta grid -------------------------------------------------------------------------------
 
 
-def cell_centres():
+def cell_centres() -> NDArray[np.float64]:
     """Centres of the 360 one-degree cells: 0, 1, .. 359 [degree]."""
     return np.arange(360.0)
 
 
-def cell_bounds():
+def cell_bounds() -> NDArray[np.float64]:
     """Lower and upper bound of every cell, (360, 2) float64 [degree]; the first is -0.5 .. 0.5."""
     return cell_centres()[:, None] + np.array([-0.5, 0.5])
 
 
-def cell_mean_weights(theta):
+def cell_mean_weights(theta: NDArray[np.float64]) -> NDArray[np.float64]:
     """Weights that turn nodal values into cell means of their piecewise linear periodic interpolation.
 
     The interpolation is integrated exactly over every cell, so the integral around the ring is kept.
@@ -330,7 +340,7 @@ class RunWriter:
         group["time"][rows] = [record.time for record in snapshots]
 
 
-def geometry_attributes(scene):
+def geometry_attributes(scene: MpmScene) -> dict[str, Any]:
     """Tunnels and gate as attributes [m, degree], for figures that read datasets only."""
     attributes = {}
     if scene.tunnels:
@@ -349,14 +359,14 @@ def geometry_attributes(scene):
     return attributes
 
 
-def write_attributes(path, **attributes):
+def write_attributes(path: str | Path, **attributes: Any) -> None:
     """Set root attributes of a run file."""
     with _append_to(path) as file:
         for name, value in attributes.items():
             file.attrs[name] = value
 
 
-def structure_group(model, tunnel=None):
+def structure_group(model: str, tunnel: int | None = None) -> str:
     """Group of a response: `structure/<model>` for the tunnel with the gate, `structure_tunnel_<k>/<model>` for others.
 
     tunnel : int or None, None: the one with the gate.
@@ -364,7 +374,9 @@ def structure_group(model, tunnel=None):
     return f"structure/{model}" if tunnel is None else f"structure_tunnel_{tunnel}/{model}"
 
 
-def write_response(path, response, model="beam-spring", tunnel=None):
+def write_response(
+    path: str | Path, response: xr.Dataset, model: str = "beam-spring", tunnel: int | None = None
+) -> None:
     """Write the response of a lining model to its :func:`structure_group`, in place of an earlier one, as a whole."""
     import h5py
 
@@ -385,7 +397,7 @@ def write_response(path, response, model="beam-spring", tunnel=None):
         beside.unlink(missing_ok=True)
 
 
-def write_dataset(path, dataset, group=None):
+def write_dataset(path: str | Path, dataset: xr.Dataset, group: str | None = None) -> None:
     """Write a dataset with checksums: into a new file, or as a group more into one whose history gets a line."""
     import h5netcdf
     from xarray.backends import H5NetCDFStore
@@ -454,7 +466,7 @@ def _limit_flag(name):
 # -- reading --------------------------------------------------------------------------------------
 
 
-def run_file(path):
+def run_file(path: str | Path) -> Path:
     """The run file for a run folder or a file; raises `RunFileError` when there is none."""
     path = Path(path)
     file = path / "run.nc" if path.is_dir() else path
@@ -464,7 +476,7 @@ def run_file(path):
     return file
 
 
-def read_run(path):
+def read_run(path: str | Path) -> xr.DataTree:
     """All groups of a run as an `xarray.DataTree`, in memory; groups as in the module's description."""
     import xarray as xr
 
@@ -485,12 +497,12 @@ def _group_names(file):
         return names + [f"{name}/{model}" for name in answered for model in content[name].groups]
 
 
-def read_attributes(path):
+def read_attributes(path: str | Path) -> dict[str, Any]:
     """Root attributes of a run: provenance, scene text, status ('interrupted' also where its process was killed)."""
     return dict(_read(run_file(path), None).attrs)
 
 
-def read_pressures(path):
+def read_pressures(path: str | Path) -> xr.Dataset:
     """Pressures on the lining through time: `/lining`, in memory.
 
     Returns
@@ -507,17 +519,19 @@ def read_pressures(path):
     return read_group(path, "lining")
 
 
-def read_history(path):
+def read_history(path: str | Path) -> xr.Dataset:
     """Inflow, zones, balances and time step through time: `/history`, in memory."""
     return read_group(path, "history")
 
 
-def read_points(path, snapshot=None):
+def read_points(path: str | Path, snapshot: int | None = None) -> xr.Dataset:
     """Snapshots of all points: `/points`, in memory; one of them when its number is given (-1: the last)."""
     return read_group(path, "points", snapshot)
 
 
-def raw_groups(path, groups=("mesh", "history", "lining", "points")):
+def raw_groups(
+    path: str | Path, groups: Sequence[str] = ("mesh", "history", "lining", "points")
+) -> dict[str, dict[str, NDArray[Any]]]:
     """Arrays of a run file as they lie in it, complete records only: group to name to array.
 
     Raises
@@ -543,17 +557,17 @@ def raw_groups(path, groups=("mesh", "history", "lining", "points")):
     return arrays
 
 
-def read_mesh(path):
+def read_mesh(path: str | Path) -> xr.Dataset:
     """The mesh: `/mesh`, in memory."""
     return read_group(path, "mesh")
 
 
-def read_response(path, model="beam-spring", tunnel=None):
+def read_response(path: str | Path, model: str = "beam-spring", tunnel: int | None = None) -> xr.Dataset:
     """The response of the lining of the tunnel with the gate, or of another `tunnel` by its number, in memory."""
     return read_group(path, structure_group(model, tunnel))
 
 
-def read_group(path, group, row=None):
+def read_group(path: str | Path, group: str | None, row: int | None = None) -> xr.Dataset:
     """One group of a run file, in memory, with complete records only; `row` picks one of them."""
     return _read(run_file(path), group, row)
 

@@ -1,12 +1,20 @@
 """Points and mesh of a run over time as files for ParaView and PyVista, and as an animation."""
 
+from __future__ import annotations
+
 import fnmatch
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from coupling.datasets import RunFileError, read_mesh, read_points, run_file
 from coupling.run_folder import FIELDS, RunRefused
+
+if TYPE_CHECKING:
+    import meshio
+    import xarray as xr
 
 #: Format: names of the files it writes, replaced by the next export into the same folder.
 FILES = {
@@ -20,7 +28,7 @@ ELEMENT_MEANS = ("pore_pressure", "porosity", "deviatoric_strain", "stress_xx", 
 SECONDS_OF_ANIMATION, LONGEST_FRAME, LAST_FRAME = 6.0, 0.5, 1.5
 
 
-def export(run, kind, out=None):
+def export(run: str | Path, kind: str, out: str | Path | None = None) -> list[Path]:
     """Write the fields of a run.
 
     Parameters
@@ -66,7 +74,7 @@ def export(run, kind, out=None):
     return [*written, write(folder / "mesh", times, mesh_grids(shots, mesh))]
 
 
-def point_grid(snapshot):
+def point_grid(snapshot: xr.Dataset) -> meshio.Mesh:
     """Points of one time as vertices: a `meshio.Mesh` with every variable, velocities and displacement as vectors.
 
     snapshot : xarray.Dataset, one time of `/points`.
@@ -82,7 +90,7 @@ def point_grid(snapshot):
     return meshio.Mesh(position, [("vertex", np.arange(len(position))[:, None])], point_data=data)
 
 
-def mesh_grids(snapshots, mesh):
+def mesh_grids(snapshots: Iterable[xr.Dataset], mesh: xr.Dataset) -> Iterator[meshio.Mesh]:
     """The mesh with what its elements hold, one `meshio.Mesh` a time.
 
     Cell data: region, displacement, the means of `ELEMENT_MEANS` (NaN where there is no material), and filled: area of

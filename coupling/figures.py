@@ -3,8 +3,11 @@
 Every function returns a `matplotlib.figure.Figure` that belongs to the caller; nothing touches pyplot's global state.
 """
 
+from __future__ import annotations
+
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
@@ -15,6 +18,9 @@ from matplotlib.patches import Annulus, Polygon
 from matplotlib.ticker import MaxNLocator
 
 from coupling.datasets import RunFileError, read_history, read_mesh, read_points, read_pressures, read_response
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 STYLE = {
     "font.size": 8,
@@ -36,7 +42,9 @@ CONCRETE = "0.82"
 FIELD_COLOURS = ("viridis", "magma_r", "YlGnBu", "cividis")  # of displacement, strain, pore pressure, stress
 
 
-def fields_around_tunnel(points, half_width=None, tops=None):
+def fields_around_tunnel(
+    points: xr.Dataset, half_width: float | None = None, tops: dict[str, float] | None = None
+) -> Figure:
     """Displacement, deviatoric strain, pore pressure, vertical effective stress (compression positive) on the points.
 
     Parameters
@@ -72,7 +80,7 @@ def fields_around_tunnel(points, half_width=None, tops=None):
     return figure
 
 
-def common_tops(points):
+def common_tops(points: xr.Dataset) -> dict[str, float]:
     """Top of the linear colour scales that suits all times: title of a panel to its value, for `fields_around_tunnel`.
 
     points : xarray.Dataset, `/points` of a run.
@@ -105,7 +113,7 @@ def _top(values, extend):
     return max(float(np.nanmax(values) if extend == "neither" else np.nanpercentile(values, 99.5)), 1.0)
 
 
-def mesh_near_gate(mesh, half_width=None):
+def mesh_near_gate(mesh: xr.Dataset, half_width: float | None = None) -> Figure:
     """The mesh around the gate, parts in different colours, with the whole tunnel beside it."""
     geometry = _Geometry(mesh)
     corners = np.stack([mesh["x"].values, mesh["y"].values], axis=1)[mesh["element_nodes"].values]
@@ -134,7 +142,7 @@ def mesh_near_gate(mesh, half_width=None):
     return figure
 
 
-def pressures_polar(pressures, time=-1, tunnel=None):
+def pressures_polar(pressures: xr.Dataset, time: int = -1, tunnel: int | None = None) -> Figure:
     """Soil and water pressure on the lining, initial against now.
 
     Parameters
@@ -168,7 +176,7 @@ def pressures_polar(pressures, time=-1, tunnel=None):
     return figure
 
 
-def internal_forces(response, time=-1):
+def internal_forces(response: xr.Dataset, time: int = -1) -> Figure:
     """Axial force, shear force and bending moment around the ring, initial against now, with their extremes.
 
     Parameters
@@ -214,7 +222,7 @@ def internal_forces(response, time=-1):
     return figure
 
 
-def deformed_ring(response, time=-1):
+def deformed_ring(response: xr.Dataset, time: int = -1) -> Figure:
     """The deformed ring, initial against now, exaggerated, with its joints and their rotations.
 
     Parameters
@@ -275,7 +283,7 @@ def deformed_ring(response, time=-1):
     return figure
 
 
-def inflow(history):
+def inflow(history: xr.Dataset) -> Figure:
     """Inflow mass, and areas of flow zone and disturbed zone, over time."""
     time = history["time"].values
     with matplotlib.rc_context(STYLE):
@@ -297,7 +305,7 @@ def inflow(history):
     return figure
 
 
-def draw_run(run, folder):
+def draw_run(run: str | Path, folder: str | Path) -> list[Path]:
     """Draw every picture a run has data for, as PNG.
 
     Parameters

@@ -1,8 +1,11 @@
 """What a file or folder is, for somebody who finds it: kind, content, and what to do with it."""
 
+from __future__ import annotations
+
 import json
 import tomllib
 from pathlib import Path
+from typing import Any
 
 from coupling.datasets import RunFileError
 from coupling.own_content import require_own_content
@@ -12,7 +15,7 @@ from coupling.studies.execute import STUDY_FILE
 SIGNATURES = {b"\x89HDF\r\n\x1a\n": "netcdf", b"\x89PNG\r\n\x1a\n": "png", b"GIF8": "gif", b"CDF": "netcdf3"}
 
 
-def describe(path):
+def describe(path: str | Path) -> dict[str, Any]:
     """What a path is.
 
     Parameters

@@ -1,7 +1,12 @@
 """What a run would do and cost, before it starts: the table and the JSON of `gush plan`."""
 
+from __future__ import annotations
+
 import math
 import time as clock
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -9,13 +14,19 @@ from coupling.plausibility import warn_in_python, warnings_of
 from coupling.run import check_memory, free_memory_bytes
 from coupling.scene import as_scene
 
+if TYPE_CHECKING:
+    from coupling.scene import Scene
+    from mpm.scene import Scene as MpmScene
+
 WARM_UP_STEPS, MEASURED_SPELLS, SECONDS_A_SPELL = 10, 5, 0.3
 # Inflow of grains over that of free discharge under the head at the gate, from runs of case 3 (docs/case-3.md): a rough
 # guess that only the expected duration uses.
 DISCHARGE_SHARE = 0.11
 
 
-def plan(scene, threads=None, warn=None):
+def plan(
+    scene: Scene | str | Path, threads: int | None = None, warn: Callable[[str], None] | None = None
+) -> dict[str, Any]:
     """Build the mesh and the points of a scene, take a few steps, and say what the run will cost.
 
     Parameters
@@ -108,7 +119,9 @@ def _why_alone(elements, asked):
     return "one was asked for" if asked == 1 else "one core" if asked is None and cores() == 1 else ""
 
 
-def rough_plan(scene, threads=None, warn=None):
+def rough_plan(
+    scene: Scene | str | Path, threads: int | None = None, warn: Callable[[str], None] | None = None
+) -> dict[str, Any]:
     """What a run would do and cost, from formulas alone: no mesh, no points, some milliseconds.
 
     Parameters
@@ -179,7 +192,7 @@ def _wave_speed(soil, water):
     return fast_wave_speed(modulus, water.bulk_modulus, soil.porosity, soil.grain_density, water.density)
 
 
-def expected_time(mpm_scene):
+def expected_time(mpm_scene: MpmScene) -> float | None:
     """Simulated time until the run stops [s]; a rough guess where an inflow mass stops it."""
     stop = mpm_scene.stop
     if stop.inflow_mass is None or mpm_scene.gate is None:
@@ -198,7 +211,7 @@ def expected_time(mpm_scene):
     return time if stop.time is None else min(time, stop.time)
 
 
-def features(scene, threads, why_alone="one thread"):
+def features(scene: Scene, threads: int, why_alone: str = "one thread") -> list[dict[str, Any]]:
     """What is active in a scene, what is left out, and why: list of {feature, active, reason}.
 
     scene : coupling.Scene;  threads : int;  why_alone : str, the reason where it is one.

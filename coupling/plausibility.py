@@ -1,7 +1,10 @@
 """Numbers that are possible but of another order of magnitude than any soil, water or lining: usually a wrong unit."""
 
+from __future__ import annotations
+
 import math
 import warnings
+from typing import TYPE_CHECKING, Any
 
 from structure.inputs import GushingWarning
 from structure.plausibility import (
@@ -16,6 +19,9 @@ from structure.plausibility import (
     joints_in_radians,
     unusual,
 )  # fmt: skip
+
+if TYPE_CHECKING:
+    from coupling.scene import Scene
 
 #: Table and key to (lowest, highest, unit, other units that people use with their factors). Zero always passes: it
 #: leaves a property out. The ranges are those of handbooks, widened until soft clay, rock and small models fit in.
@@ -58,7 +64,7 @@ USUAL = {
 LEAST_BESIDE, LEAST_BELOW = 1.5, 1.0
 
 
-def warnings_of(scene):
+def warnings_of(scene: Scene) -> list[str]:
     """What a user should look at again before a run: one sentence a number, empty where all is usual.
 
     Parameters
@@ -78,7 +84,7 @@ def warnings_of(scene):
     return told + _narrow_box(scene.mpm)
 
 
-def warn_in_python(message):
+def warn_in_python(message: str) -> None:
     """Tell a user of Python what the command line prints: a :class:`structure.GushingWarning`."""
     warnings.warn(message, GushingWarning, stacklevel=3)
 
@@ -105,7 +111,7 @@ def _narrow_box(scene):
     return told
 
 
-def hints(data):
+def hints(data: dict[str, Any]) -> dict[tuple[Any, ...], str]:
     """Unusual numbers of a scene's nested dictionary, validated or not.
 
     Returns
@@ -130,7 +136,7 @@ def hints(data):
     return found
 
 
-def shown(path):
+def shown(path: tuple[Any, ...]) -> str:
     """A path as people write it: soils[0].porosity."""
     text = ""
     for part in path:

@@ -1,5 +1,11 @@
 """A run repeated from what its file says, and compared bit for bit with it."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 
 from coupling.datasets import raw_groups, read_attributes, run_file
@@ -13,7 +19,13 @@ from coupling.scene import parse_scene
 NOT_COMPARED = {"cpu_seconds"}
 
 
-def rerun(first, out=None, progress=None, threads=None, warn=None):
+def rerun(
+    first: str | Path,
+    out: str | Path | None = None,
+    progress: Callable[[dict[str, Any]], None] | None = None,
+    threads: int | None = None,
+    warn: Callable[[str], None] | None = None,
+) -> dict[str, Any]:
     """Repeat a run in another folder and compare all that was simulated.
 
     Parameters
@@ -48,7 +60,7 @@ def rerun(first, out=None, progress=None, threads=None, warn=None):
     return {"run": str(first), "rerun": folder, "changed": changed, **compare_bits(file, folder)}
 
 
-def compare_bits(first, second):
+def compare_bits(first: str | Path, second: str | Path) -> dict[str, Any]:
     """Compare mesh, pressures, history and points of two runs over the records that both have.
 
     Returns

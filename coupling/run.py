@@ -1,9 +1,14 @@
 """A run from scene to files: mesh, simulation written as it goes, response of the ring, pictures."""
 
+from __future__ import annotations
+
 import contextlib
 import logging
 import numbers
 import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from coupling.checkpoint import remove_checkpoints
 from coupling.datasets import read_pressures, write_response
@@ -14,15 +19,29 @@ from coupling.run_folder import FIGURES, LOG_FILE, RUN_FILE, RunRefused, claimed
 from coupling.scene import as_scene
 from mpm.threads import check_threads
 
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from coupling.scene import Scene
+    from mpm.scene import Scene as MpmScene
+    from structure.ring import Ring
+
 BYTES_PER_ELEMENT = 2000  # points, buffers and the copy made while sorting, of a case with 3 points an element
 
 log = logging.getLogger(__name__)
 
 
 def run(
-    scene=None, out=None, overwrite=False, progress=None, threads=None, figures=False, resume=False,
-    checkpoint_interval=60.0, warn=None,
-):  # fmt: skip
+    scene: Scene | str | Path | None = None,
+    out: str | Path | None = None,
+    overwrite: bool = False,
+    progress: Callable[[dict[str, Any]], None] | None = None,
+    threads: int | None = None,
+    figures: bool = False,
+    resume: bool = False,
+    checkpoint_interval: float = 60.0,
+    warn: Callable[[str], None] | None = None,
+) -> xr.Dataset:
     """Simulate a scene and return the pressures on the lining through time.
 
     Parameters
@@ -72,30 +91,31 @@ def run(
     _check_arguments(out, progress, threads, checkpoint_interval, warn)
     if resume and (out is None or overwrite):
         raise RunRefused("--resume: needs the folder of the run, and no --overwrite; give it as --out DIR")
-    scene = None if scene is None else as_scene(scene)
+    given = None if scene is None else as_scene(scene)
     if not resume:
-        if scene is None:
+        if given is None:
             raise RunRefused("scene: must be given unless a run is resumed; name a built-in one, as 'quick'")
-        check_memory(scene.mpm)
-        out = default_folder(scene.name) if out is None else out
+        check_memory(given.mpm)
+        out = default_folder(given.name) if out is None else out
     report = progress if progress is not None else lambda state: None
     held = reopened(out) if resume else claimed(out, overwrite)
     with held as folder, _logged_to(folder / LOG_FILE):
-        remains = find_remains(folder, scene, _teller(warn)) if resume else None
+        remains = find_remains(folder, given, _teller(warn)) if resume else None
         if remains is not None:
-            scene = remains.scene
-            check_memory(scene.mpm)
+            chosen: Scene = remains.scene
+            check_memory(chosen.mpm)
         else:
-            for warning in warnings_of(scene):
+            chosen = given
+            for warning in warnings_of(chosen):
                 _teller(warn)(warning)
         if remains is not None and remains.finished:
             remove_checkpoints(folder)
         else:
-            RecordedSimulation(scene, folder, report, threads, checkpoint_interval, remains).run()
+            RecordedSimulation(chosen, folder, report, threads, checkpoint_interval, remains).run()
         if figures:
-            finish(scene, folder, report)
+            finish(chosen, folder, report)
         pressures = read_pressures(folder)
-    pressures.attrs |= {"run": str(folder), "scene_name": scene.name}
+    pressures.attrs |= {"run": str(folder), "scene_name": chosen.name}
     return pressures
 
 
@@ -123,7 +143,7 @@ def _teller(warn):
     return tell
 
 
-def finish(scene, folder, progress):
+def finish(scene: Scene, folder: Path, progress: Callable[[dict[str, Any]], None]) -> list[Path]:
     """Response of the ring to a run's pressures and all pictures; returns the paths of the pictures.
 
     Raises
@@ -153,7 +173,7 @@ def finish(scene, folder, progress):
     return pictures
 
 
-def respond(scene, pressures, backend="beam-spring"):
+def respond(scene: Scene, pressures: xr.Dataset, backend: str = "beam-spring") -> xr.Dataset:
     """Response of the scene's ring to the pressures on the tunnel with the gate, by the lining model of that name.
 
     Raises
@@ -170,7 +190,7 @@ def respond(scene, pressures, backend="beam-spring"):
     return respond_by_name(scene.ring, pressures, backend)
 
 
-def respond_beside(scene, folder, backend="beam-spring"):
+def respond_beside(scene: Scene, folder: Path, backend: str = "beam-spring") -> list[int]:
     """Store the responses of the tunnels without the gate that have the ring's diameters; returns their numbers.
 
     Their ground is that at their own axis; what the scene says of it stands for the tunnel with the gate.
@@ -195,7 +215,7 @@ def respond_beside(scene, folder, backend="beam-spring"):
     return answered
 
 
-def respond_by_name(ring, pressures, backend, **options):
+def respond_by_name(ring: Ring, pressures: xr.Dataset, backend: str, **options: Any) -> xr.Dataset:
     """Response of a ring by the lining model of that name; `options` go to the model.
 
     Raises
@@ -211,7 +231,7 @@ def respond_by_name(ring, pressures, backend, **options):
         raise RunRefused(str(problem)) from problem
 
 
-def check_memory(mpm_scene):
+def check_memory(mpm_scene: MpmScene) -> None:
     """Refuse a scene whose mesh and points would not fit into the memory that is free."""
     free, need = free_memory_bytes(), mpm_scene.estimated_elements * BYTES_PER_ELEMENT
     if free is not None and need > 0.8 * free:
@@ -221,7 +241,7 @@ def check_memory(mpm_scene):
         )
 
 
-def free_memory_bytes():
+def free_memory_bytes() -> int | None:
     """Memory that a new process can use without swapping; None where the system does not tell."""
     with contextlib.suppress(OSError, ValueError), open("/proc/meminfo", encoding="ascii") as lines:
         for line in lines:

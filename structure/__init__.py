@@ -4,6 +4,22 @@ Names load on first use, so that ``import structure`` itself costs nothing.
 """
 
 from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from structure.beam_spring import BeamSpringLining
+    from structure.checks import CapacityRule, Limits, check
+    from structure.continuum import ContinuumLining
+    from structure.continuum_bolts import Bolts
+    from structure.continuum_mesh import GasketGroove, Opening
+    from structure.inputs import GushingWarning, InputError
+    from structure.lining import LiningFailure, LiningModel, additional
+    from structure.models import lining_model, lining_model_names, register_lining_model
+    from structure.ring import Ground, Ring
+    from structure.sections import SegmentSection
+    from structure.theory import theoretical_pressures
+
+    __version__: str
 
 _HOMES = {
     "Ring": "structure.ring",
@@ -28,14 +44,39 @@ _HOMES = {
     "theoretical_pressures": "structure.theory",
 }
 
-__all__ = sorted(_HOMES)
+__all__ = [
+    "BeamSpringLining",
+    "Bolts",
+    "CapacityRule",
+    "ContinuumLining",
+    "GasketGroove",
+    "Ground",
+    "GushingWarning",
+    "InputError",
+    "Limits",
+    "LiningFailure",
+    "LiningModel",
+    "Opening",
+    "Ring",
+    "SegmentSection",
+    "additional",
+    "check",
+    "lining_model",
+    "lining_model_names",
+    "register_lining_model",
+    "theoretical_pressures",
+]
 
 
-def __getattr__(name):
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("gushing")
     if name in _HOMES:
         return getattr(import_module(_HOMES[name]), name)
     raise AttributeError(f"module 'structure' has no attribute {name!r}")
 
 
-def __dir__():
-    return sorted({*globals(), *_HOMES})
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOMES, "__version__"})

@@ -1,9 +1,17 @@
 """States of a run at equal inflow mass, what they are over the initial state, and how evenly material flows in."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+if TYPE_CHECKING:
+    import xarray as xr
 
-def at_inflow(dataset, inflow_mass):
+
+def at_inflow(dataset: xr.Dataset, inflow_mass: float) -> xr.Dataset:
     """State at an inflow mass, linear between the records around its first crossing.
 
     Parameters
@@ -44,7 +52,7 @@ def at_inflow(dataset, inflow_mass):
     return dataset.interp(time=time[after - 1] + share * (time[after] - time[after - 1]), assume_sorted=True)
 
 
-def with_inflow(dataset, history):
+def with_inflow(dataset: xr.Dataset, history: xr.Dataset) -> xr.Dataset:
     """A dataset over time with the inflow mass of the history at its times, so that :func:`at_inflow` takes it.
 
     Parameters
@@ -58,7 +66,7 @@ def with_inflow(dataset, history):
     return dataset.assign(inflow_mass=("time", mass, dict(history["inflow_mass"].attrs)))
 
 
-def pressure_ratio(pressures, name, inflow_mass):
+def pressure_ratio(pressures: xr.Dataset, name: str, inflow_mass: float) -> xr.DataArray:
     """Pressure on the lining at an inflow mass over the initial one, at every angle.
 
     Parameters
@@ -86,7 +94,7 @@ def pressure_ratio(pressures, name, inflow_mass):
     return ratio.rename(name).assign_attrs(units="1", long_name=f"{about}, over the initial one")
 
 
-def additional_at_inflow(response, inflow_mass):
+def additional_at_inflow(response: xr.Dataset, inflow_mass: float) -> xr.Dataset:
     """What the event has added to the ring's forces and displacements at an inflow mass.
 
     Parameters
@@ -111,7 +119,7 @@ def additional_at_inflow(response, inflow_mass):
     return at_inflow(additional(response), inflow_mass)
 
 
-def ratio_to_initial(pressures, name, inflow_mass, angles):
+def ratio_to_initial(pressures: xr.Dataset, name: str, inflow_mass: float, angles: Sequence[float]) -> float:
     """Mean of a pressure over some angles at an inflow mass, over the same mean of the initial state [-].
 
     angles : sequence of float, degrees from the crown, clockwise; cells of the theta grid nearest to them.
@@ -121,7 +129,7 @@ def ratio_to_initial(pressures, name, inflow_mass, angles):
     return float(now) / float(field.isel(time=0))
 
 
-def inflow_linearity(history, first, last):
+def inflow_linearity(history: xr.Dataset, first: float, last: float) -> tuple[float, float]:
     """Straight-line fit of inflow mass over time between two inflow masses [kg/m].
 
     Returns

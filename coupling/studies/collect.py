@@ -5,14 +5,18 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from coupling.provenance import origin, with_history
 from coupling.studies.design import Case, Study, StudyError
 
+if TYPE_CHECKING:
+    import xarray as xr
 
-def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, str]):
+
+def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, str]) -> xr.Dataset:
     """The cases' datasets along a dimension `case`, loaded when used.
 
     Returns
@@ -125,7 +129,7 @@ def stored_cases(folder: str | Path) -> tuple[Study, list[Case], dict[str, str]]
     return plan, found, {key: message for key, (_, status, message) in entries.items() if status == "failed"}
 
 
-def read_study(folder: str | Path):
+def read_study(folder: str | Path) -> xr.Dataset:
     """The dataset of a study that ran earlier.
 
     Parameters
