@@ -46,7 +46,7 @@ def pressures(scene, n_times):
     fall = share * np.exp(-(((base["theta"] - GATE[0]) / 15) ** 2))
     loads = base.isel(time=0, drop=True).map(lambda part: (part * (1 - fall)).transpose("time", "theta"))
     loads = loads.assign_coords(time=("time", np.arange(n_times, dtype=float), {"units": "s"}))
-    loads["inflow_mass"] = ("time", np.linspace(0, 1000, n_times), {"units": "kg m-1"})
+    loads["inflow_mass"] = ("time", np.linspace(0, 1000, n_times), {"units": "kg/m"})
     return loads
 
 

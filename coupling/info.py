@@ -134,7 +134,8 @@ def _run_facts(file):
             facts["snapshots of the points"] = int(content["points"].dimensions["time"].size)
         if "mesh" in content.groups:
             facts["triangles"] = int(content["mesh"].dimensions["element"].size)
-        models = list(content["structure"].groups) if "structure" in content.groups else []
+        stored = content["structure"].groups if "structure" in content.groups else {}
+        models = [str(group.attrs.get("model", name)) for name, group in stored.items()]
     facts["lining models"] = ", ".join(models) or "none"
     return facts
 

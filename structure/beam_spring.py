@@ -247,5 +247,5 @@ class BeamSpringLining(LiningModel):
         response["theta"].attrs["bounds"] = "theta_bnds"
         response = response.assign_coords(theta_bnds=(("theta", "bounds"), np.stack([centre - half, centre + half], 1)))
         if "inflow_mass" in pressures:
-            response["inflow_mass"] = pressures["inflow_mass"]
+            response = response.assign_coords(inflow_mass=pressures["inflow_mass"])
         return response

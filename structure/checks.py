@@ -160,11 +160,11 @@ def _capacity_check(response, limits, thickness):
     share = axial.copy(data=measure(boundary, axial.values, moment.values))
     closed = [np.append(values, values[0]) for values in boundary]
     return {
-        "design_axial_force": _described(axial, "N m-1", "design axial force, compression positive"),
-        "design_bending_moment": _described(moment, "N m m-1", "design bending moment, tension outside positive"),
+        "design_axial_force": _described(axial, "N/m", "design axial force, compression positive"),
+        "design_bending_moment": _described(moment, "N m/m", "design bending moment, tension outside positive"),
         "section_utilisation": _described(share, "1", f"utilisation of the segments in N and M, {rule.utilisation}"),
-        "capacity_axial_force": ("capacity_point", closed[0], _meaning("N m-1", "axial force at capacity")),
-        "capacity_bending_moment": ("capacity_point", closed[1], _meaning("N m m-1", "bending moment at capacity")),
+        "capacity_axial_force": ("capacity_point", closed[0], _meaning("N/m", "axial force at capacity")),
+        "capacity_bending_moment": ("capacity_point", closed[1], _meaning("N m/m", "bending moment at capacity")),
     }
 
 
@@ -193,7 +193,7 @@ def _convergence_check(response, limit, diameter):
     larger = np.maximum(np.abs(response["convergence_horizontal"]), np.abs(response["convergence_vertical"]))
     return {
         "convergence_per_mille": _described(
-            1e3 * larger / diameter, "1e-3", "larger change of the two diameters over the outer diameter"
+            1e3 * larger / diameter, "mm/m", "larger change of the two diameters over the outer diameter"
         ),
         "convergence_utilisation": _described(1e3 * larger / diameter / limit, "1", "convergence over its limit"),
     }

@@ -28,7 +28,7 @@ STRESSES = {
     "stress_rt": ("Pa", "shear stress in the lining, positive where it turns a radius clockwise outside"),
 }
 #: Units and long name of the one variable beyond the schema of all models.
-BOLT_FORCE = {"units": "N m-1", "long_name": "force in the bolts of a joint per metre of tunnel, tension positive"}
+BOLT_FORCE = {"units": "N/m", "long_name": "force in the bolts of a joint per metre of tunnel, tension positive"}
 
 
 class ContinuumLining(LiningModel):
@@ -415,7 +415,7 @@ class ContinuumLining(LiningModel):
         response["theta"].attrs["bounds"] = "theta_bnds"
         response = response.assign_coords(theta_bnds=(("theta", "bounds"), np.stack([centre - half, centre + half], 1)))
         if "inflow_mass" in pressures:
-            response["inflow_mass"] = pressures["inflow_mass"]
+            response = response.assign_coords(inflow_mass=pressures["inflow_mass"])
         return response
 
 

@@ -25,14 +25,14 @@ PRESSURES = ("soil_pressure", "water_pressure", "soil_shear")
 
 #: name: (dimensions, units, long name)
 RESPONSE = {
-    "axial_force": (("time", "theta"), "N m-1", "axial force per metre of tunnel, compression positive"),
-    "shear_force": (("time", "theta"), "N m-1", "shear force per metre of tunnel, Q = -dM/ds"),
-    "bending_moment": (("time", "theta"), "N m m-1", "bending moment per metre of tunnel, tension outside positive"),
+    "axial_force": (("time", "theta"), "N/m", "axial force per metre of tunnel, compression positive"),
+    "shear_force": (("time", "theta"), "N/m", "shear force per metre of tunnel, Q = -dM/ds"),
+    "bending_moment": (("time", "theta"), "N m/m", "bending moment per metre of tunnel, tension outside positive"),
     "displacement_radial": (("time", "theta"), "m", "radial displacement of the lining, outward positive"),
     "displacement_tangential": (("time", "theta"), "m", "tangential displacement of the lining, clockwise positive"),
-    "joint_axial_force": (("time", "joint"), "N m-1", "axial force in the joint, compression positive"),
-    "joint_shear_force": (("time", "joint"), "N m-1", "shear force in the joint, Q = -dM/ds"),
-    "joint_bending_moment": (("time", "joint"), "N m m-1", "bending moment in the joint, tension outside positive"),
+    "joint_axial_force": (("time", "joint"), "N/m", "axial force in the joint, compression positive"),
+    "joint_shear_force": (("time", "joint"), "N/m", "shear force in the joint, Q = -dM/ds"),
+    "joint_bending_moment": (("time", "joint"), "N m/m", "bending moment in the joint, tension outside positive"),
     "joint_opening": (("time", "joint"), "m", "joint opening on the centre line, gap positive"),
     "joint_dislocation": (("time", "joint"), "m", "joint dislocation, clockwise segment inward positive"),
     "joint_rotation": (("time", "joint"), "rad", "joint rotation, opening on the outside positive"),
@@ -40,12 +40,12 @@ RESPONSE = {
     "convergence_vertical": (("time",), "m", "shortening of the vertical diameter"),
     "settlement": (("time",), "m", "mean downward displacement of the ring"),
     "equilibrium_residual": (("time",), "1", "unbalanced force on the ring or a node over the sum of all nodal loads"),
-    "shear_moment_residual": (("time",), "N m-1", "largest departure from Q + dM/ds + couple of outer-face shear = 0"),
-    "load_sum_horizontal": (("time",), "N m-1", "horizontal sum of pressures, weight and balance, right positive"),
-    "load_sum_vertical": (("time",), "N m-1", "vertical sum of pressures, weight and balance, up positive"),
-    "spring_sum_horizontal": (("time",), "N m-1", "horizontal sum of soil springs and support, right positive"),
-    "spring_sum_vertical": (("time",), "N m-1", "vertical sum of soil springs and support, up positive"),
-    "balanced_uplift": (("time",), "N m-1", "vertical sum of pressures and weight balanced by radial soil pressure"),
+    "shear_moment_residual": (("time",), "N/m", "largest departure from Q + dM/ds + couple of outer-face shear = 0"),
+    "load_sum_horizontal": (("time",), "N/m", "horizontal sum of pressures, weight and balance, right positive"),
+    "load_sum_vertical": (("time",), "N/m", "vertical sum of pressures, weight and balance, up positive"),
+    "spring_sum_horizontal": (("time",), "N/m", "horizontal sum of soil springs and support, right positive"),
+    "spring_sum_vertical": (("time",), "N/m", "vertical sum of soil springs and support, up positive"),
+    "balanced_uplift": (("time",), "N/m", "vertical sum of pressures and weight balanced by radial soil pressure"),
 }
 
 #: Variables of a response that are no state of the ring: their change since the first record says nothing.

@@ -261,7 +261,7 @@ def test_additional_forces_start_at_zero_and_carry_the_inflow():
     np.testing.assert_array_equal(
         added["bending_moment"].isel(time=2), response["bending_moment"][2] - response["bending_moment"][0]
     )
-    assert added["bending_moment"].attrs["units"] == "N m m-1"
+    assert added["bending_moment"].attrs["units"] == "N m/m"
     assert added["bending_moment"].attrs["long_name"].startswith("additional bending moment")
     with pytest.raises(ValueError, match="must have a time dimension"):
         additional(response.isel(time=0))

@@ -21,7 +21,7 @@ def dataset(data):
     def values(rows, key):
         return [row[key] for row in rows]
 
-    rate = {"units": "s-1", "long_name": "point-steps per second of processor time"}
+    rate = {"units": "1/s", "long_name": "point-steps per second of processor time"}
     kernels, configurations, sizes = data["kernels"], data["configurations"], data["sizes"]
     result = xr.Dataset(
         {

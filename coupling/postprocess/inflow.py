@@ -52,6 +52,36 @@ def at_inflow(dataset: xr.Dataset, inflow_mass: float) -> xr.Dataset:
     return dataset.interp(time=time[after - 1] + share * (time[after] - time[after - 1]), assume_sorted=True)
 
 
+def by_inflow(dataset: xr.Dataset) -> xr.Dataset:
+    """The records over inflow mass instead of time, for selection and interpolation: unique, strictly increasing.
+
+    Of records with the same inflow mass, or less than an earlier one had, the first stays: of the zeros before
+    anything has come in, that is the initial state.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        With `inflow_mass` (time) [kg/m]: pressures, history, response, or the whole of a tree's group.
+
+    Returns
+    -------
+    xarray.Dataset
+        With the dimension `inflow_mass` in place of `time`, which is a coordinate along it.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> mass = [0.0, 0.0, 0.0, 30.0, 29.0, 60.0]
+    >>> run = xr.Dataset({"inflow_mass": ("time", mass)}, coords={"time": [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]})
+    >>> by_inflow(run).sel(inflow_mass=50.0, method="nearest").time.item()
+    5.0
+    """
+    mass = dataset["inflow_mass"].values
+    before = np.maximum.accumulate(np.concatenate([[-np.inf], mass[:-1]]))
+    rising = np.flatnonzero(mass > before)
+    return dataset.isel(time=rising).set_coords("inflow_mass").swap_dims(time="inflow_mass")
+
+
 def with_inflow(dataset: xr.Dataset, history: xr.Dataset) -> xr.Dataset:
     """A dataset over time with the inflow mass of the history at its times, so that :func:`at_inflow` takes it.
 
@@ -63,7 +93,7 @@ def with_inflow(dataset: xr.Dataset, history: xr.Dataset) -> xr.Dataset:
         With `inflow_mass` (time) [kg/m].
     """
     mass = np.interp(dataset["time"].values, history["time"].values, history["inflow_mass"].values)
-    return dataset.assign(inflow_mass=("time", mass, dict(history["inflow_mass"].attrs)))
+    return dataset.assign_coords(inflow_mass=("time", mass, dict(history["inflow_mass"].attrs)))
 
 
 def pressure_ratio(pressures: xr.Dataset, name: str, inflow_mass: float) -> xr.DataArray:
@@ -88,7 +118,7 @@ def pressure_ratio(pressures: xr.Dataset, name: str, inflow_mass: float) -> xr.D
     ValueError
         When the run did not get there.
     """
-    now = at_inflow(pressures[[name, "inflow_mass"]], inflow_mass)[name]
+    now = at_inflow(pressures[[name, "inflow_mass"]], inflow_mass)[name].drop_vars("inflow_mass", errors="ignore")
     ratio = now / pressures[name].isel(time=0, drop=True)
     about = pressures[name].attrs.get("long_name", name)
     return ratio.rename(name).assign_attrs(units="1", long_name=f"{about}, over the initial one")

@@ -111,7 +111,7 @@ def trough(settlement: xr.DataArray) -> xr.Dataset:
         ("centre", "m", "middle of the trough"),
         ("width", "m", "distance i from the middle of the trough to its inflection"),
         ("r_squared", "1", "coefficient of determination of the Gauss curve"),
-        ("volume", "m2", "area of the trough"),
+        ("volume", "m^2", "area of the trough"),
     )
     columns = np.array(rows).T
     return xr.Dataset(

@@ -40,8 +40,8 @@ function timeCharts(onPick) {
   return [...made, ...recordedCharts(onPick)];
 }
 
-// "kg m-1" as kg/m, "m2" as m²
-const readable = (units) => (units === "1" ? "" : units.replace(/ (\w+)-1/g, "/$1").replace(/m2\b/, "m²"));
+// "m^2" as m², and "kg m-1" of older files as kg/m
+const readable = (units) => (units === "1" ? "" : units.replace(/ (\w+)-1/g, "/$1").replace(/m\^?2\b/, "m²"));
 
 function recordedCharts(onPick) {
   const place = document.getElementById("history"), made = [];

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coupling.datasets import HISTORY
-from coupling.report.series import match_times, model_names
+from coupling.report.series import match_times, model_label, model_names
 from coupling.summary import PLACES
 
 #: Variable and which extreme of it: (label, unit shown, factor from SI).
@@ -213,7 +213,11 @@ def _ring_numbers(run):
         rows, present = match_times(responses[name]["time"].values, first["time"].values[-1:])
         if present[0]:
             others.append(ring_extremes(responses[name], int(rows[0])))
-    basis = f"difference from {', '.join(models[1:])}" if others else "none: one lining model, nothing to compare with"
+    basis = (
+        f"difference from {', '.join(model_label(run, name) for name in models[1:])}"
+        if others
+        else "none: one lining model, nothing to compare with"
+    )
     return [
         Number(key, label, unit, scale, start[key], end[key],
                max((abs(other[key] - end[key]) for other in others if key in other), default=None), basis)
@@ -241,16 +245,16 @@ def quality(run, summary, scene=None):
              summary["grain_mass_error"] <= MASS_LIMIT)]  # fmt: skip
     rows += _against_theory(run["lining"].to_dataset(), scene)
     for name in model_names(run):
-        response = run[f"structure/{name}"].to_dataset()
+        response, label = run[f"structure/{name}"].to_dataset(), model_label(run, name)
         if not response.sizes["time"]:
             continue
         if "equilibrium_residual" in response:
             worst = float(np.abs(response["equilibrium_residual"]).max())
-            rows.append((f"equilibrium of the ring, {name}: largest unbalanced share", f"{worst:.1e}",
+            rows.append((f"equilibrium of the ring, {label}: largest unbalanced share", f"{worst:.1e}",
                          worst <= RESIDUAL_LIMIT))  # fmt: skip
         if "shear_moment_residual" in response:
             share = float(np.abs(response["shear_moment_residual"]).max() / np.nanmax(np.abs(response["shear_force"])))
-            rows.append((f"Q = -dM/ds, {name}: largest departure over the largest Q", f"{share:.1e}",
+            rows.append((f"Q = -dM/ds, {label}: largest departure over the largest Q", f"{share:.1e}",
                          share <= SHEAR_LIMIT))  # fmt: skip
     for name, count in summary["clamps"].items():
         share = 100 * count / max(summary["point_steps"], 1)
@@ -294,7 +298,8 @@ def warnings(run, attributes, quality_rows):
     for name in models:
         answered = run[f"structure/{name}"].sizes.get("time", 0)
         if answered != records:
-            found.append(f"The response of {name} holds {answered} of {records} records: run `gush respond` again.")
+            label = model_label(run, name)
+            found.append(f"The response of {label} holds {answered} of {records} records: run `gush respond` again.")
     if "soil_pressure" in lining and records > 1:
         last = lining.isel(time=-1)
         for name, label in (("soil_pressure", "soil"), ("water_pressure", "water")):

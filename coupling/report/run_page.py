@@ -5,7 +5,7 @@ from coupling.report.fields import field_snapshots, mesh_picture
 from coupling.report.numbers import key_numbers, quality, warnings
 from coupling.report.packing import packed
 from coupling.report.scene_facts import facts, left_out, read_scene, section
-from coupling.report.series import choose_frames, history_series, lining_series, model_names, model_series
+from coupling.report.series import choose_frames, history_series, lining_series, model_label, model_names, model_series
 from coupling.summary import summarise_run
 
 SCRIPTS = (
@@ -54,7 +54,10 @@ def _player(tree, scene, frames, fields):
         "inflow_mass": packed(lining["inflow_mass"].values[frames]),
         "section": section(scene, lining.attrs),
         "lining": lining_series(tree, frames),
-        "models": [model_series(name, tree[f"structure/{name}"].to_dataset(), times) for name in model_names(tree)],
+        "models": [
+            model_series(model_label(tree, name), tree[f"structure/{name}"].to_dataset(), times)
+            for name in model_names(tree)
+        ],
         "history": history_series(tree),
         "mesh": mesh_picture(tree["mesh"].to_dataset()) if "mesh" in tree.children else None,
         "fields": fields,

@@ -30,8 +30,13 @@ def choose_frames(run):
 
 
 def model_names(run):
-    """Lining models that a run holds, in the order they were stored."""
+    """Groups of the lining models that a run holds, in the order they were stored."""
     return list(run["structure"].children) if "structure" in run.children else []
+
+
+def model_label(run, name):
+    """The name of a lining model as users write it."""
+    return str(run[f"structure/{name}"].attrs.get("model", name))
 
 
 def lining_series(run, frames):
@@ -116,7 +121,7 @@ def history_series(run):
                 "label": variable.attrs.get("long_name", name),
                 **packed(variable.values),
             }
-            for name, variable in kept.data_vars.items()
-            if variable.dims == ("time",) and name != "dt_limit"
+            for name, variable in {**kept.data_vars, **kept.coords}.items()
+            if name != "time" and variable.dims == ("time",) and name != "dt_limit"
         },
     }
