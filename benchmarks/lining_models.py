@@ -97,7 +97,7 @@ def open_gate(scene):
     lines = ["| cut | pressures | N | Q | M | radial displacement | joint rotation |", "|---" * 7 + "|"]
     for cut in (0.05, 1 / 6, 0.5, 0.9, 1.0):
         try:
-            hole = ContinuumLining(scene.ring, opening=(*GATE, cut)).respond(loads)
+            hole = ContinuumLining(scene.ring, gate=(*GATE, cut)).respond(loads)
         except LiningFailure as failure:
             lines.append(f"| {cut:.2f} | initial | {failure} | | | | |")
             continue

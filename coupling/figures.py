@@ -398,13 +398,13 @@ class _Geometry:
         return x + radius * np.sin(np.radians(theta)), y + radius * np.cos(np.radians(theta))
 
     def draw(self, axis, zorder=1):
-        """Lining in grey, with the gap."""
+        """Lining in grey, with the gate."""
         for k, (x, depth, outer, inner) in enumerate(self.tunnels):
             style = {"fc": CONCRETE, "ec": "0.25", "lw": 0.6, "zorder": zorder}
             if self.gate is None or k != self.tunnel:
                 axis.add_patch(Annulus((x, -depth), outer, outer - inner, **style))
                 continue
-            # the walls of the gap are parallel: its angle differs on the two faces
+            # the walls of the gate are parallel: its angle differs on the two faces
             faces = []
             for radius in (outer, inner):
                 half = np.arcsin(self.gate["width"] / 2 / radius)

@@ -117,7 +117,7 @@ class Scene(Input):
             if gate.width >= segment:
                 raise ValueError(
                     f"gate: width must be below the shortest segment of the ring ({segment:.3g} m on its inner face), "
-                    f"got {gate.width:g} m; the gap lies in or between segments, give e.g. 0.2"
+                    f"got {gate.width:g} m; the gate lies in or between segments, give e.g. 0.2"
                 )
         return self
 

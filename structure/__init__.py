@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from structure.checks import CapacityRule, Limits, check
     from structure.continuum import ContinuumLining
     from structure.continuum_bolts import Bolts
-    from structure.continuum_mesh import GasketGroove, Opening
+    from structure.continuum_mesh import GasketGroove, Gate
     from structure.inputs import GushingWarning, InputError
     from structure.lining import LiningFailure, LiningModel, additional
     from structure.models import lining_model, lining_model_names, register_lining_model
@@ -35,7 +35,7 @@ _HOMES = {
     "SegmentSection": "structure.sections",
     "BeamSpringLining": "structure.beam_spring",
     "ContinuumLining": "structure.continuum",
-    "Opening": "structure.continuum_mesh",
+    "Gate": "structure.continuum_mesh",
     "GasketGroove": "structure.continuum_mesh",
     "Bolts": "structure.continuum_bolts",
     "lining_model": "structure.models",
@@ -56,7 +56,7 @@ __all__ = [
     "Limits",
     "LiningFailure",
     "LiningModel",
-    "Opening",
+    "Gate",
     "Ring",
     "SegmentSection",
     "additional",

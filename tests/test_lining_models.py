@@ -192,7 +192,7 @@ def test_file_that_does_not_follow_the_schema_is_refused(written, change, messag
     [
         (("--second", "continum"), "did you mean 'continuum'"),
         (("--second", "beam-spring"), "models must differ"),
-        (("--open-gate", "2"), "opening: cut"),
+        (("--open-gate", "2"), "gate: cut"),
         (("--scene", "case-33"), "did you mean"),
     ],
 )

@@ -4,7 +4,7 @@ class TimeChart {
   constructor(key, svg, lines, onPick, { fromZero = true, unit = "" } = {}) {
     Object.assign(this, { key, svg, lines, unit, names: [...new Set(lines.map((l) => l.name))] });
     const range = roundRange(rangeOf(lines.map((l) => rangeOf([l.values], l.factor)), 1), fromZero);
-    this.chart = new LineChart(svg, { x: lines[0].time, xLabel: "time since the gap opened [s]", yRange: range,
+    this.chart = new LineChart(svg, { x: lines[0].time, xLabel: "time since the gate opened [s]", yRange: range,
       classes: lines.map(() => "line"), styles: lines.map((l) => l.style), onPick });
     lines.forEach((line, k) => this.chart.set(k, line.values, line.factor));
     const of = (name) => lines.filter((l) => l.name === name);

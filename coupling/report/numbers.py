@@ -140,10 +140,10 @@ def _pressure_numbers(lining):
     for name, label in (("soil_pressure", "soil"), ("water_pressure", "water")):
         for place, theta in PLACES.items():
             series, spread = lining[name].sel(theta=theta).values, lining[f"{name}_std"].sel(theta=theta).values
-            open_here = len(series) > 1 and _in_gap(lining.attrs, theta)
+            open_here = len(series) > 1 and _in_gate(lining.attrs, theta)
             numbers.append(
                 Number(
-                    f"{name}_{theta}", f"{label}, {place}{' (the gap)' if open_here else ''}", "kPa", 1e-3,
+                    f"{name}_{theta}", f"{label}, {place}{' (the gate)' if open_here else ''}", "kPa", 1e-3,
                     float(series[0]), None if open_here else float(series[-1]),
                     None if open_here else scatter(series, spread[-1]), "scatter of the last records",
                 )
@@ -151,8 +151,8 @@ def _pressure_numbers(lining):
     return numbers
 
 
-def _in_gap(geometry, theta):
-    """Whether an angle [degree] lies in the gap, where the open lining carries no pressure."""
+def _in_gate(geometry, theta):
+    """Whether an angle [degree] lies in the gate, where the open lining carries no pressure."""
     if "gate_angle" not in geometry:
         return False
     outer = float(np.atleast_1d(geometry["tunnel_outer_radius"])[int(geometry["gate_tunnel"])])

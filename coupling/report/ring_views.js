@@ -12,7 +12,7 @@ class RingChart {
   build() {
     const lines = this.sources(), svg = document.getElementById(this.key);
     const range = roundRange(rangeOf(this.compared(), this.factor), true);
-    const options = { x: this.angles, yRange: range, marks: gate ? [{ angle: gate.angle, text: "gap" }] : [],
+    const options = { x: this.angles, yRange: range, marks: gate ? [{ angle: gate.angle, text: "gate" }] : [],
       classes: ["initial", ...lines.map((_, k) => modelClass(k))] };
     this.chart = shape === "polar" ? new PolarChart(svg, options) : new LineChart(svg, { ...options,
       xLabel: "angle from the crown, clockwise [°]", xTicks: [0, 60, 120, 180, 240, 300, 360], height: 250 });

@@ -90,7 +90,7 @@ def _player(player):
         tools = (
             f'<div class="tools"><label>Field <select id="field">{options}</select></label>'
             '<label>View <select id="field-view"><option value="tunnel">around the tunnel</option>'
-            '<option value="gate">at the gap</option></select></label></div>'
+            '<option value="gate">at the gate</option></select></label></div>'
         )
         parts.append(figure("fields", "Ground around the tunnel", "", "canvas", tools))
     parts.append(figure("inflow_mass", "Inflow mass", "kg/m", "svg"))
@@ -162,7 +162,7 @@ def _scene(data):
         )
         tools = (
             '<div class="tools"><label>View <select id="mesh-view"><option value="tunnel">around the tunnel</option>'
-            '<option value="gate">at the gap</option><option value="box">whole box</option></select></label></div>'
+            '<option value="gate">at the gate</option><option value="box">whole box</option></select></label></div>'
         )
         mesh_figure = figure("mesh", "Mesh", "", "canvas", tools)
     return f"""<section aria-labelledby="scene">

@@ -205,7 +205,7 @@ Page Up and Page Down leap, space plays.</p>
 <div class="tools"><label>Ring charts <select id="shape"><option value="polar">around the ring</option>
 <option value="unrolled">unrolled over the angle</option></select></label>
 <label>Show <select id="against"><option value="value">values</option>
-<option value="change">change since the gap opened</option></select></label>{model}</div>
+<option value="change">change since the gate opened</option></select></label>{model}</div>
 <section aria-labelledby="around"><h3 id="around">Around the lining at this inflow mass</h3>
 <div class="grid three">{around}</div></section>
 <section aria-labelledby="progress"><h3 id="progress">Progress of the gushing</h3>
@@ -213,7 +213,7 @@ Page Up and Page Down leap, space plays.</p>
 <div class="grid three">{progress}</div></section>
 {forces}
 <h3 id="now-title">Cases at this inflow mass</h3>
-<p class="about">Values of the inflow mass nearest to the slider; below each value its change since the gap opened.</p>
+<p class="about">Values of the inflow mass nearest to the slider; below each value its change since the gate opened.</p>
 {scroll("now-title", table)}
 </section>"""
 
