@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from coupling.checkpoint import remove_checkpoints
 from coupling.datasets import read_pressures, write_response
 from coupling.plausibility import warn_in_python, warnings_of
+from coupling.progress_line import ProgressLine, in_notebook
 from coupling.recorded_simulation import RecordedSimulation, write_quality
 from coupling.resume import find_remains
 from coupling.run_folder import FIGURES, LOG_FILE, RUN_FILE, RunRefused, claimed, default_folder, reopened
@@ -35,12 +36,13 @@ def run(
     scene: Scene | str | Path | None = None,
     out: str | Path | None = None,
     overwrite: bool = False,
-    progress: Callable[[dict[str, Any]], None] | None = None,
+    progress: Callable[[dict[str, Any]], None] | bool | None = None,
     threads: int | None = None,
     figures: bool = False,
     resume: bool = False,
     checkpoint_interval: float = 60.0,
     warn: Callable[[str], None] | None = None,
+    response: bool | None = None,
 ) -> xr.Dataset:
     """Simulate a scene and return the pressures on the lining through time.
 
@@ -54,13 +56,15 @@ def run(
         None: `runs/<scene>` in the current folder, numbered when that one is taken.
     overwrite : bool
         Replace an earlier run in `out`.
-    progress : callable or None
-        Called a few times a second with a dict: stage ("mesh", "relax", "gush", "respond", "figures"), time [s],
-        inflow_mass [kg/m], dt [s], dt_limit, point_steps_per_second, step, residual.
+    progress : callable, bool or None
+        True: a line that says how far the run is, see :class:`coupling.progress_line.ProgressLine`; None: such a line
+        in a notebook, and nothing elsewhere. A function is called a few times a second with a dict: stage ("mesh",
+        "relax", "gush", "respond", "figures"), time [s], inflow_mass [kg/m], dt [s], dt_limit,
+        point_steps_per_second, step, residual.
     threads : int or None
         None: all cores. The result does not depend on it.
     figures : bool
-        Also compute the response of the scene's ring into `/structure/beam-spring` and draw all pictures.
+        Also draw all pictures.
     resume : bool
         Continue the run in `out`, however it was stopped, to the bits that it would have had uninterrupted.
     checkpoint_interval : float
@@ -68,6 +72,8 @@ def run(
     warn : callable or None
         Called with what a user should know and the log says too: unusual numbers, damaged files, another processor.
         None: each is a Python warning, a :class:`structure.GushingWarning`.
+    response : bool or None
+        Also compute the forces in the scene's ring, into `/structure/beam_spring`; None: with the pictures.
 
     Returns
     -------
@@ -97,9 +103,8 @@ def run(
             raise RunRefused("scene: must be given unless a run is resumed; name a built-in one, as 'quick'")
         check_memory(given.mpm)
         out = default_folder(given.name) if out is None else out
-    report = progress if progress is not None else lambda state: None
     held = reopened(out) if resume else claimed(out, overwrite)
-    with held as folder, _logged_to(folder / LOG_FILE):
+    with held as folder, _logged_to(folder / LOG_FILE), _shown(progress) as report:
         remains = find_remains(folder, given, _teller(warn)) if resume else None
         if remains is not None:
             chosen: Scene = remains.scene
@@ -112,8 +117,7 @@ def run(
             remove_checkpoints(folder)
         else:
             RecordedSimulation(chosen, folder, report, threads, checkpoint_interval, remains).run()
-        if figures:
-            finish(chosen, folder, report)
+        finish(chosen, folder, report, figures if response is None else response, figures)
         pressures = read_pressures(folder)
     pressures.attrs |= {"run": str(folder), "scene_name": chosen.name}
     return pressures
@@ -126,7 +130,8 @@ def _check_arguments(out, progress, threads, checkpoint_interval, warn):
         raise RunRefused(str(problem)) from None
     if out is not None and not isinstance(out, str | os.PathLike):
         raise RunRefused(f"out: must be the path of a folder, got {out!r}; leave it out for runs/SCENE")
-    for name, function in (("progress", progress), ("warn", warn)):
+    shown = None if isinstance(progress, bool) else progress
+    for name, function in (("progress", shown), ("warn", warn)):
         if function is not None and not callable(function):
             raise RunRefused(f"{name}: must be a function, got {function!r}; give one that takes what it is told")
     if isinstance(checkpoint_interval, bool) or not isinstance(checkpoint_interval, numbers.Real):
@@ -143,31 +148,44 @@ def _teller(warn):
     return tell
 
 
-def finish(scene: Scene, folder: Path, progress: Callable[[dict[str, Any]], None]) -> list[Path]:
-    """Response of the ring to a run's pressures and all pictures; returns the paths of the pictures.
+def _shown(progress):
+    """What is told of the progress, as a context."""
+    if callable(progress):
+        return contextlib.nullcontext(progress)
+    return ProgressLine(quiet=not (in_notebook() if progress is None else progress))
+
+
+def finish(
+    scene: Scene, folder: Path, progress: Callable[[dict[str, Any]], None], response: bool = True, figures: bool = True
+) -> list[Path]:
+    """Response of the ring to a run's pressures and all pictures, where asked for; returns the paths of the pictures.
 
     Raises
     ------
     RunRefused, structure.LiningFailure
         As :func:`respond`, after the pictures of the ground have been drawn.
     """
-    from coupling.figures import draw_run
     from structure import LiningFailure
 
     failure = None
-    if scene.ring is not None and scene.mpm.tunnels:
+    if response and scene.ring is not None and scene.mpm.tunnels:
         progress({"stage": "respond"})
         try:
-            response = respond(scene, read_pressures(folder))
-            write_response(folder / RUN_FILE, response)
+            answer = respond(scene, read_pressures(folder))
+            write_response(folder / RUN_FILE, answer)
             respond_beside(scene, folder)
-            write_quality(folder / RUN_FILE, response)
+            write_quality(folder / RUN_FILE, answer)
         except (RunRefused, LiningFailure) as error:
             log.error("no response of the ring: %s", error)
-            error.add_note(f"the ground is computed: its pressures and pictures are in {folder}")
+            pictured = " and pictures" if figures else ""
+            error.add_note(f"the ground is computed: its pressures{pictured} are in {folder}")
             failure = error
-    progress({"stage": "figures"})
-    pictures = draw_run(folder, folder / FIGURES)
+    pictures = []
+    if figures:
+        from coupling.figures import draw_run
+
+        progress({"stage": "figures"})
+        pictures = draw_run(folder, folder / FIGURES)
     if failure is not None:
         raise failure
     return pictures

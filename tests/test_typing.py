@@ -17,8 +17,8 @@ PACKAGES = ("mpm", "structure", "coupling")
 #: Modules whose plain functions people call in scripts and notebooks.
 MODULES = (
     "coupling.run", "coupling.datasets", "coupling.plan", "coupling.rerun", "coupling.export", "coupling.figures",
-    "coupling.summary", "coupling.quality", "coupling.info", "coupling.report.page", "structure.theory",
-    "structure.models", "structure.checks",
+    "coupling.summary", "coupling.progress_line", "coupling.quality", "coupling.info", "coupling.report.page",
+    "structure.theory", "structure.models", "structure.checks",
     *(f"coupling.postprocess.{module.name}" for module in pkgutil.iter_modules(coupling.postprocess.__path__)),
 )  # fmt: skip
 SCRIPT = """

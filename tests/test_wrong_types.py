@@ -43,7 +43,7 @@ def test_run_takes_the_name_of_a_scene():
         ({"threads": 1.5}, "threads: .* got 1.5"),
         ({"threads": True}, "threads: .* got True"),
         ({"out": 3}, "out: must be the path of a folder, got 3"),
-        ({"progress": True}, "progress: must be a function, got True"),
+        ({"progress": "bar"}, "progress: must be a function, got 'bar'"),
         ({"warn": "no"}, "warn: must be a function, got 'no'"),
         ({"checkpoint_interval": -1}, "checkpoint_interval: must not be negative, got -1"),
         ({"checkpoint_interval": "60 s"}, "checkpoint_interval: must be a number of seconds, got '60 s'"),
