@@ -344,7 +344,10 @@ def _response_table(data):
                     for state in ("initial", "final")
                 ),
             )
-    for name, label in (("joint_opening", "joint opening [mm]"), ("joint_rotation", "joint rotation [mrad]")):
+    for name, label in (
+        ("joint_opening", "joint opening (+) or closing (-) [mm]"),
+        ("joint_rotation", "joint rotation [mrad]"),
+    ):
         if data[name]["final"]:
             cells = (" ".join(f"{1e3 * value:.2f}" for value in data[name][state]) for state in ("initial", "final"))
             table.add_row(label.replace("[", "\\["), *cells)

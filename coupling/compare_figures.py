@@ -15,7 +15,7 @@ PANELS = (
     ("bending_moment", "bending moment M [kN m/m]"),
 )
 JOINTS = (
-    ("joint_opening", "opening [mm]"),
+    ("joint_opening", "opening (+) or closing (\N{MINUS SIGN}) [mm]"),
     ("joint_dislocation", "dislocation [mm]"),
     ("joint_rotation", "rotation [mrad]"),
 )

@@ -277,7 +277,7 @@ def deformed_ring(response: xr.Dataset, time: int = -1) -> Figure:
         axis.set_ylabel("y from the axis [m]")
         axis.set_title(
             f"deformation, {factor:g} times enlarged (largest {1e3 * np.hypot(radial, tangential).max():.1f} mm)\n"
-            "at the joints: rotation and opening"
+            "at the joints: rotation, and opening (+) or closing (\N{MINUS SIGN})"
         )
         _legend_below(figure, axis)
     return figure

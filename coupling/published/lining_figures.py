@@ -17,7 +17,7 @@ FORCES = {
     "bending_moment": "bending moment M [kN m/m]",
 }
 JOINTS = {
-    "joint_opening": ("opening [mm]", 1e3),
+    "joint_opening": ("opening (+) or closing (\N{MINUS SIGN}) [mm]", 1e3),
     "joint_dislocation": ("dislocation [mm]", 1e3),
     "joint_rotation": ("rotation [mrad]", 1e3),
 }

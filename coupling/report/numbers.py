@@ -16,10 +16,10 @@ RING_EXTREMES = {
     "shear_force_min": ("shear force Q, smallest", "kN/m", 1e-3),
     "bending_moment_max": ("bending moment M, largest", "kN m/m", 1e-3),
     "bending_moment_min": ("bending moment M, smallest", "kN m/m", 1e-3),
-    "joint_opening_max": ("joint opening, largest", "mm", 1e3),
+    "joint_opening_max": ("joint opening (+) or closing (−), largest", "mm", 1e3),
     "joint_rotation_max": ("joint rotation, largest size", "mrad", 1e3),
-    "convergence_horizontal": ("horizontal diameter shortens by", "mm", 1e3),
-    "convergence_vertical": ("vertical diameter shortens by", "mm", 1e3),
+    "convergence_horizontal": ("horizontal diameter shorter (+) or longer (−)", "mm", 1e3),
+    "convergence_vertical": ("vertical diameter shorter (+) or longer (−)", "mm", 1e3),
 }
 RESIDUAL_LIMIT = 1e-6  # of the loads; the ring's iteration stops well below
 MASS_LIMIT = 1e-9  # relative; grains are only moved, so round-off is all that may show
@@ -27,10 +27,14 @@ SHEAR_LIMIT = 0.05  # of the largest Q; the slope of M is taken over one element
 THEORY_LIMIT = 0.02  # of the mean pressure; an element at the lining sees the depth of its middle
 
 
+DIFFERENCE = "difference from"
+
+
 class Number(NamedTuple):
     """A number of the run: SI values and how they are shown.
 
-    initial, final : float or None;  scale : factor from SI to `unit`;  error : float (SI) or None;  basis : str.
+    initial, final : float or None;  scale : factor from SI to `unit`;  error : float (SI) or None;  basis : str, what
+    the error is; one that begins with `DIFFERENCE` is no error but how far another lining model is from this one.
     """
 
     key: str
@@ -41,6 +45,11 @@ class Number(NamedTuple):
     final: float | None
     error: float | None
     basis: str
+
+    @property
+    def is_difference(self):
+        """Whether `error` is the difference from another lining model."""
+        return self.basis.startswith(DIFFERENCE)
 
 
 def key_numbers(run):
@@ -213,11 +222,10 @@ def _ring_numbers(run):
         rows, present = match_times(responses[name]["time"].values, first["time"].values[-1:])
         if present[0]:
             others.append(ring_extremes(responses[name], int(rows[0])))
-    basis = (
-        f"difference from {', '.join(model_label(run, name) for name in models[1:])}"
-        if others
-        else "none: one lining model, nothing to compare with"
+    labels = (
+        ", ".join(model_label(run, name) for name in models[1:]) if others else "another lining model: there is none"
     )
+    basis = f"{DIFFERENCE} {labels}"
     return [
         Number(key, label, unit, scale, start[key], end[key],
                max((abs(other[key] - end[key]) for other in others if key in other), default=None), basis)

@@ -130,7 +130,7 @@ class DeformedRing {
 }
 
 const JOINT_COLUMNS = [["joint_axial_force", "N"], ["joint_shear_force", "Q"], ["joint_bending_moment", "M"],
-  ["joint_opening", "opening"], ["joint_dislocation", "dislocation"], ["joint_rotation", "rotation"]];
+  ["joint_opening", "opening (+) or closing (−)"], ["joint_dislocation", "dislocation"], ["joint_rotation", "rotation"]];
 
 function drawJointTable(frame) {
   const body = tableWith(document.getElementById("joint-table"), "Now; below each value that of the start.",
@@ -159,11 +159,11 @@ const most = (values) => -least(values.map((v) => -v));
 const MODEL_ROWS = [
   ...[["axial_force", "axial force N"], ["shear_force", "shear force Q"], ["bending_moment", "bending moment M"]].flatMap(
     ([key, name]) => [[`${name}, largest`, key, "fields", most], [`${name}, smallest`, key, "fields", least]]),
-  ["joint opening, largest", "joint_opening", "joints", most],
+  ["joint opening (+) or closing (−), largest", "joint_opening", "joints", most],
   ["joint dislocation, largest size", "joint_dislocation", "joints", biggest],
   ["joint rotation, largest size", "joint_rotation", "joints", biggest],
-  ["horizontal diameter shortens by", "convergence_horizontal", "series", (v) => v[0]],
-  ["vertical diameter shortens by", "convergence_vertical", "series", (v) => v[0]],
+  ["horizontal diameter shorter (+) or longer (−)", "convergence_horizontal", "series", (v) => v[0]],
+  ["vertical diameter shorter (+) or longer (−)", "convergence_vertical", "series", (v) => v[0]],
   ["settlement", "settlement", "series", (v) => v[0]],
 ];
 
