@@ -13,11 +13,11 @@ import matplotlib
 import numpy as np
 from matplotlib.collections import EllipseCollection, PolyCollection
 from matplotlib.colors import LogNorm, Normalize
-from matplotlib.figure import Figure
 from matplotlib.patches import Annulus, Polygon
 from matplotlib.ticker import MaxNLocator
 
 from coupling.datasets import RunFileError, read_history, read_mesh, read_points, read_pressures, read_response
+from coupling.picture import Picture
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,7 +44,7 @@ FIELD_COLOURS = ("viridis", "magma_r", "YlGnBu", "cividis")  # of displacement, 
 
 def fields_around_tunnel(
     points: xr.Dataset, half_width: float | None = None, tops: dict[str, float] | None = None
-) -> Figure:
+) -> Picture:
     """Displacement, deviatoric strain, pore pressure, vertical effective stress (compression positive) on the points.
 
     Parameters
@@ -61,7 +61,7 @@ def fields_around_tunnel(
     half = 3.0 * radius if half_width is None else half_width
     data, fields = _fields(points, x0, y0, half)
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 6.4), layout="constrained")
+        figure = Picture(figsize=(7.2, 6.4), layout="constrained")
         axes = figure.subplots(2, 2, sharex=True, sharey=True)
         for axis, (title, values, colours, norm, extend) in zip(axes.flat, fields, strict=True):
             if norm is None:
@@ -113,7 +113,7 @@ def _top(values, extend):
     return max(float(np.nanmax(values) if extend == "neither" else np.nanpercentile(values, 99.5)), 1.0)
 
 
-def mesh_near_gate(mesh: xr.Dataset, half_width: float | None = None) -> Figure:
+def mesh_near_gate(mesh: xr.Dataset, half_width: float | None = None) -> Picture:
     """The mesh around the gate, parts in different colours, with the whole tunnel beside it."""
     geometry = _Geometry(mesh)
     corners = np.stack([mesh["x"].values, mesh["y"].values], axis=1)[mesh["element_nodes"].values]
@@ -125,7 +125,7 @@ def mesh_near_gate(mesh: xr.Dataset, half_width: float | None = None) -> Figure:
         gx, gy = geometry.at(geometry.gate["angle"], radius - 0.5 * geometry.thickness)
         views.append((gx, gy, 5 * geometry.gate["width"] if half_width is None else half_width))
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(3.6 * len(views), 3.5), layout="constrained")
+        figure = Picture(figsize=(3.6 * len(views), 3.5), layout="constrained")
         axes = np.atleast_1d(figure.subplots(1, len(views)))
         for axis, (x, y, half), line in zip(axes, views, (0.2, 0.4), strict=False):
             near = (np.abs(corners - [x, y]) < 2 * half).all(axis=(1, 2))
@@ -142,7 +142,7 @@ def mesh_near_gate(mesh: xr.Dataset, half_width: float | None = None) -> Figure:
     return figure
 
 
-def pressures_polar(pressures: xr.Dataset, time: int = -1, tunnel: int | None = None) -> Figure:
+def pressures_polar(pressures: xr.Dataset, time: int = -1, tunnel: int | None = None) -> Picture:
     """Soil and water pressure on the lining, initial against now.
 
     Parameters
@@ -160,7 +160,7 @@ def pressures_polar(pressures: xr.Dataset, time: int = -1, tunnel: int | None = 
     angle = np.radians(pressures["theta"].values)
     first, now = pressures.isel(time=0), pressures.isel(time=time)
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 4.0), layout="constrained")
+        figure = Picture(figsize=(7.2, 4.0), layout="constrained")
         axes = figure.subplots(1, 2, subplot_kw={"projection": "polar"})
         titles = {"soil_pressure": "effective soil pressure [kPa]", "water_pressure": "water pressure [kPa]"}
         for axis, (name, title) in zip(axes, titles.items(), strict=True):
@@ -176,7 +176,7 @@ def pressures_polar(pressures: xr.Dataset, time: int = -1, tunnel: int | None = 
     return figure
 
 
-def internal_forces(response: xr.Dataset, time: int = -1) -> Figure:
+def internal_forces(response: xr.Dataset, time: int = -1) -> Picture:
     """Axial force, shear force and bending moment around the ring, initial against now, with their extremes.
 
     Parameters
@@ -194,7 +194,7 @@ def internal_forces(response: xr.Dataset, time: int = -1) -> Figure:
         ("bending_moment", "bending moment M [kN m/m]"),
     )
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.4, 3.15), layout="constrained")
+        figure = Picture(figsize=(7.4, 3.15), layout="constrained")
         axes = figure.subplots(1, 3, subplot_kw={"projection": "polar"})
         for axis, (name, title) in zip(axes, panels, strict=True):
             _crown_up(axis)
@@ -222,7 +222,7 @@ def internal_forces(response: xr.Dataset, time: int = -1) -> Figure:
     return figure
 
 
-def deformed_ring(response: xr.Dataset, time: int = -1) -> Figure:
+def deformed_ring(response: xr.Dataset, time: int = -1) -> Picture:
     """The deformed ring, initial against now, exaggerated, with its joints and their rotations.
 
     Parameters
@@ -243,7 +243,7 @@ def deformed_ring(response: xr.Dataset, time: int = -1) -> Figure:
     factor = _round_down(0.18 * radius / max(largest, 1e-12))
     joints = np.radians(response["joint_angle"].values) if response.sizes.get("joint") else np.array([])
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(4.6, 4.7), layout="constrained")
+        figure = Picture(figsize=(4.6, 4.7), layout="constrained")
         axis = figure.subplots()
         axis.add_patch(Annulus((0, 0), outer, outer - inner, fc="0.92", ec="0.8", lw=0.5, zorder=0))
         styles = ({"color": INITIAL, "ls": (0, (4, 2)), "lw": 1.1, "label": "initial"}, {"color": NOW})
@@ -283,11 +283,11 @@ def deformed_ring(response: xr.Dataset, time: int = -1) -> Figure:
     return figure
 
 
-def inflow(history: xr.Dataset) -> Figure:
+def inflow(history: xr.Dataset) -> Picture:
     """Inflow mass, and areas of flow zone and disturbed zone, over time."""
     time = history["time"].values
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(4.6, 4.4), layout="constrained")
+        figure = Picture(figsize=(4.6, 4.4), layout="constrained")
         upper, lower = figure.subplots(2, 1, sharex=True)
         upper.plot(time, history["inflow_mass"].values, color=NOW)
         upper.set_ylabel("inflow mass [kg/m]")

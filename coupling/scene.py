@@ -6,6 +6,7 @@ tunnel with the gate, ``[ring.ground]`` from the soil at that tunnel's axis (see
 """
 
 import difflib
+import html
 import json
 import math
 import tomllib
@@ -20,7 +21,7 @@ from pydantic import BaseModel, ValidationError, model_validator
 from coupling.plausibility import hints, shown
 from coupling.scene_lines import holds, line_of, path_of
 from mpm.scene import Scene as MpmScene
-from structure.inputs import Input, InputError, mistakes, models_in, shortened
+from structure.inputs import Input, InputError, mistakes, models_in, shortened, table_html
 from structure.ring import Ring
 
 # No scene is longer; a larger file is something else.
@@ -67,6 +68,22 @@ class Scene(Input):
     def name(self) -> str:
         """Name of the scene."""
         return self.mpm.name
+
+    def __repr__(self) -> str:
+        from coupling.report.scene_facts import facts
+
+        rows = facts(self)
+        width = max(len(what) for what, _ in rows)
+        return "\n".join([f"scene '{self.name}'", *(f"  {what:{width}}  {value}" for what, value in rows)])
+
+    __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        from coupling.report.scene_facts import facts
+
+        text = f"<details><summary>the complete scene</summary><pre>{html.escape(self.source)}</pre></details>"
+        rows = {what: html.escape(value) for what, value in facts(self)}
+        return table_html(f"scene '{self.name}'", rows) + text
 
     @cached_property
     def source(self) -> str:

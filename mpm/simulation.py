@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time as clock
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -40,7 +40,7 @@ class Record:
     dt: float
     dt_limit: str
     steps: int
-    lining: list
+    lining: list = field(repr=False)
     inflow_mass: float
     flow_zone_area: float
     disturbed_area: float
@@ -48,11 +48,11 @@ class Record:
     suspended_fraction: float
     kinetic_energy: float
     max_velocity: float
-    clamp_counts: dict
-    balances: dict
+    clamp_counts: dict = field(repr=False)
+    balances: dict = field(repr=False)
     point_steps: int
     cpu_seconds: float
-    points: dict | None
+    points: dict | None = field(repr=False)
 
 
 def simulate(

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import html
 import reprlib
+import textwrap
 import warnings
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Self
@@ -47,6 +49,16 @@ class Input(BaseModel):
         # inner tables are validated with the outer one, whose mistakes then name the whole path
         __init__.__pydantic_base_init__ = True
 
+    def __repr__(self) -> str:
+        # a value a line, as Python would take it back
+        lines = [f"{name}={value!r}" for name, value in self]
+        return f"{type(self).__name__}(\n" + "".join(textwrap.indent(f"{line},\n", "    ") for line in lines) + ")"
+
+    __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        return table_html(type(self).__name__, {name: _short_html(value) for name, value in self})
+
     def unusual(self) -> dict[str, str]:
         """Values of another order of magnitude than any that is usual: name to what to think of."""
         told = {name: unusual(getattr(self, name), *usual) for name, usual in self.usual.items()}
@@ -60,6 +72,23 @@ class Input(BaseModel):
         InputError
         """
         return type(self)(**{name: getattr(self, name) for name in self.model_fields_set} | dict(update or {}))
+
+
+def table_html(title: str, rows: Mapping[str, str]) -> str:
+    """A table for a notebook: title, and name to HTML of the value."""
+    body = "".join(
+        f'<tr><th style="text-align:left">{html.escape(name)}</th><td style="text-align:left">{value}</td></tr>'
+        for name, value in rows.items()
+    )
+    return f"<table><caption><b>{html.escape(title)}</b></caption><tbody>{body}</tbody></table>"
+
+
+def _short_html(value: Any) -> str:
+    if isinstance(value, Input):
+        return f"<details><summary>{html.escape(type(value).__name__)}</summary>{value._repr_html_()}</details>"
+    if isinstance(value, float):
+        return html.escape(f"{value:g}")
+    return html.escape(", ".join(f"{entry:g}" for entry in value) if isinstance(value, tuple) else str(value))
 
 
 def refusal(who: str, found: list[Mistake]) -> str:
