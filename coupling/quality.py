@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from mpm.variables import CLAMPS
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: Name in :func:`quality`: (long name for the line, format).
 LABELS = {
@@ -20,7 +25,7 @@ LABELS = {
 }
 
 
-def quality(history, response=None):
+def quality(history: xr.Dataset, response: xr.Dataset | None = None) -> dict[str, Any]:
     """Errors of a run's balances over all its records, and of the lining's equilibrium.
 
     Parameters
@@ -63,11 +68,11 @@ def quality(history, response=None):
     return result
 
 
-def quality_line(values):
+def quality_line(values: dict[str, Any]) -> str:
     """The numbers of :func:`quality` in one line for people."""
     return ", ".join(f"{label} {form.format(values[name])}" for name, (label, form) in LABELS.items() if name in values)
 
 
-def quality_attributes(values):
+def quality_attributes(values: dict[str, Any]) -> dict[str, float]:
     """The same as attributes of a run file: `quality_<name>`, numbers only."""
     return {f"quality_{name}": value for name, value in values.items() if name != "clamps"}

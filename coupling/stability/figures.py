@@ -2,9 +2,9 @@
 
 import matplotlib
 import numpy as np
-from matplotlib.figure import Figure
 
 from coupling.figures import GATE, NOW, SECOND, STYLE
+from coupling.picture import Picture
 
 PLACES = ("layout", "random", "edges", "vertices")
 SETS = (("spectral", 1, NOW), ("spectral", 0, "0.45"), ("altitude", 1, SECOND), ("altitude", 0, GATE))
@@ -19,7 +19,7 @@ def critical_courant(linear):
         Of :func:`coupling.stability.linear.critical_map`.
     """
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(8.4, 7.6), layout="constrained")
+        figure = Picture(figsize=(8.4, 7.6), layout="constrained")
         axes = figure.subplots(3, 2)
         moduli, permeability = _family(linear, "moduli"), _family(linear, "permeability")
         moduli = moduli.isel(configuration=np.isfinite(moduli.bulk_modulus.values))

@@ -14,7 +14,7 @@ POSITIONS = (
 )
 WAYS = ("altitude", "spectral")
 UNITS = {
-    "bulk_modulus": "Pa", "hydraulic_conductivity": "m s-1", "youngs_modulus": "Pa", "size": "m", "pic_rate": "s-1",
+    "bulk_modulus": "Pa", "hydraulic_conductivity": "m/s", "youngs_modulus": "Pa", "size": "m", "pic_rate": "1/s",
     "altitude": "s", "spectral": "s", "actual": "s",
 }  # fmt: skip
 
