@@ -50,12 +50,20 @@ def with_checks(response, limits):
     return checked, {name: float(checked[name].max()) for name in UTILISATIONS if name in checked}
 
 
-def draw_checks(checked, file, model):
-    """Draw the checks beside a run's figures, or beside a file that is no run's; returns the path."""
+def draw_checks(checked, file, model, own_file=None, tunnel=None):
+    """Draw the checks beside a run's figures, or beside the response's own file and named after it; returns the path.
+
+    file : path, of the run;  own_file : path or None, from :func:`coupling.stored_response.chosen_file`;  tunnel : int
+    or None, of those without the gate.
+    """
     from coupling.check_figures import checks
     from coupling.figures import RESOLUTION
 
     folder = file.parent / FIGURES
-    path = (folder if folder.is_dir() else file.parent) / f"checks-{model}.png"
+    path = (folder if folder.is_dir() else file.parent) / (
+        f"checks-{model}{'' if tunnel is None else f'-tunnel-{tunnel}'}.png"
+    )
+    if own_file is not None:
+        path = own_file.with_name(f"{own_file.stem}-checks.png")
     checks(checked).savefig(path, dpi=RESOLUTION)
     return str(path)

@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from coupling.events import EventStream
-from coupling.exit_codes import DIFFERENT, JsonPath, checked_json, failures, warn, write_json
+from coupling.exit_codes import DIFFERENT, JsonPath, checked_json, failures, told_warnings, warn, write_json
 from coupling.measure_commands import accuracy_command, bench_command, stability_command, study_command
 from coupling.published.command import figures_command, published_command
 from coupling.result_commands import export_command, info_command, report_command
@@ -32,6 +32,10 @@ SceneName = Annotated[str, typer.Argument(help="A built-in scene (see `gush scen
 SOURCE = "Folder or run.nc of a run, or a netCDF-4 file with pressures that follow the schema."
 RingScene = Annotated[
     str | None, typer.Option("--scene", help="Scene whose ring is taken; that of the run when left out.")
+]
+Changes = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="Change one value of the scene: gate.angle=45, 'gate.width=20 cm'; may be repeated."),
 ]
 Threads = Annotated[int | None, typer.Option(min=1, help="Threads; all cores when left out. Does not change results.")]
 
@@ -58,6 +62,7 @@ def run_command(
     scene: Annotated[
         str | None, typer.Argument(help="A built-in scene (see `gush scenes`) or a TOML file; quick when left out.")
     ] = None,
+    changes: Changes = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the run; runs/SCENE, numbered, when left out.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")] = False,
     resume: Annotated[
@@ -79,15 +84,17 @@ def run_command(
     JSON: keys of `coupling.summary.summarise_run`, and `run` (folder), `figures` (paths), `response` (keys of
     `coupling.summary.summarise_response`, or null). Events: see `coupling.events.EventStream`.
     """
-    with failures(), checked_json(json_path), checked_json(events), EventStream(events) as stream:
+    with failures(), checked_json(json_path), checked_json(events), EventStream(events) as stream, told_warnings():
         from coupling.datasets import RunFileError, read_response
         from coupling.quality import quality_line
         from coupling.run import run
-        from coupling.run_folder import FIGURES
-        from coupling.scene import load_scene
+        from coupling.run_folder import FIGURES, RunRefused
+        from coupling.scene import load_scene, parse_changes
         from coupling.summary import summarise_response, summarise_run
 
-        loaded = None if resume and scene is None else load_scene(scene or "quick")
+        if resume and scene is None and changes:
+            raise RunRefused("--set: changes a scene, got --resume without one; name the scene or leave --set out")
+        loaded = None if resume and scene is None else load_scene(scene or "quick", **parse_changes(changes or []))
         with ProgressLine(quiet) as line:
             pressures = run(
                 loaded, out, overwrite, stream.following(line), threads, not no_figures, resume, checkpoint_interval,
@@ -98,6 +105,8 @@ def run_command(
         with contextlib.suppress(RunFileError):
             data["response"] = summarise_response(read_response(folder))
             data["quality"]["lining_equilibrium"] = data["response"]["equilibrium_residual"]
+            for tunnel, one in data["tunnels"].items():
+                one["response"] = summarise_response(read_response(folder, tunnel=tunnel))
         data["figures"] = sorted(str(path) for path in (folder / FIGURES).glob("*.png"))
         write_json(json_path, data)
         stream.tell("result", **data)
@@ -106,6 +115,9 @@ def run_command(
             console.print(_run_table(data))
             if data["response"]:
                 console.print(_response_table(data["response"]))
+            for tunnel, one in data["tunnels"].items():
+                if one["response"]:
+                    console.print(_response_table(one["response"], tunnel))
             console.print(f"errors: {quality_line(data['quality'])}", highlight=False)
             console.print(f"results in {folder}", highlight=False, soft_wrap=True)
 
@@ -144,6 +156,7 @@ def rerun_command(
 @app.command("plan")
 def plan_command(
     scene: SceneName,
+    changes: Changes = None,
     threads: Threads = None,
     rough: Annotated[bool, typer.Option("--rough", help="From formulas alone, without building the mesh.")] = False,
     json_path: JsonPath = None,
@@ -155,9 +168,9 @@ def plan_command(
     with failures(), checked_json(json_path):
         from coupling.plan import plan, rough_plan
         from coupling.plausibility import warnings_of
-        from coupling.scene import load_scene
+        from coupling.scene import load_scene, parse_changes
 
-        loaded = load_scene(scene)
+        loaded = load_scene(scene, **parse_changes(changes or []))
         warnings = warnings_of(loaded)
         for warning in warnings:
             warn(warning)
@@ -179,40 +192,57 @@ def respond_command(
     limits: Annotated[
         Path | None, typer.Option(help="TOML file of structure.Limits: checks the response and draws its utilisations.")
     ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="File for the response; when left out RUN itself, beside it where RUN is none.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file of an earlier response.")] = False,
     json_path: JsonPath = None,
 ):
     """Compute the ring's response to the pressures of a run, and store it with them as /structure/BACKEND.
 
-    JSON: keys of `coupling.summary.summarise_response`, and `run`, `backend`; with --limits `utilisations` (largest of
-    every check, 1 is its limit) and `figure` (path).
+    The response of another ring (--scene), or to pressures that are no run, goes into a file of its own beside them:
+    FILE-BACKEND.nc.
+
+    JSON: keys of `coupling.summary.summarise_response`, and `run`, `backend`, `file` (path of the response); with
+    --limits `utilisations` (largest of every check, 1 is its limit) and `figure` (path). Of several tunnels these are
+    of that with the gate, `tunnels` has the same of the others.
     """
-    with failures(), checked_json(json_path):
+    with failures(), checked_json(json_path), told_warnings():
         from coupling.checked_response import draw_checks, read_limits, with_checks
-        from coupling.datasets import write_response
-        from coupling.pressure_source import read_source
+        from coupling.pressure_source import read_sources
         from coupling.run import respond_by_name
+        from coupling.stored_response import chosen_file, store_response
         from coupling.summary import summarise_response
 
-        source = read_source(run, scene)
+        sources = read_sources(run, scene)
         given = None if limits is None else read_limits(limits)
-        response = respond_by_name(source.ring, source.pressures, backend)
         name = backend.rpartition(":")[2]
-        data = {"run": str(run), "backend": name, **summarise_response(response)}
-        if given is not None:
-            response, data["utilisations"] = with_checks(response, given)
-        write_response(source.file, response, name)
-        if given is not None:
-            data["figure"] = draw_checks(response, source.file, name)
+        targets = [chosen_file(source, name, out, overwrite) for source in sources]
+        answers = []
+        for source, target in zip(sources, targets, strict=True):
+            response = respond_by_name(source.ring, source.pressures, backend)
+            answer = summarise_response(response)
+            if given is not None:
+                response, answer["utilisations"] = with_checks(response, given)
+            answer["file"] = str(store_response(response, source, name, target))
+            if given is not None:
+                answer["figure"] = draw_checks(response, source.file, name, target, source.tunnel)
+            answers.append(answer)
+        data = {"run": str(run), "backend": name, **answers[0]}
+        if len(sources) > 1:
+            data["tunnels"] = {source.tunnel: answer for source, answer in zip(sources[1:], answers[1:], strict=True)}
         write_json(json_path, data)
         if str(json_path) != "-":
             console = Console()
-            console.print(_response_table(data))
-            if given is not None:
-                shares = ", ".join(
-                    f"{check.replace('_', ' ')} {share:.2f}" for check, share in data["utilisations"].items()
-                )
-                console.print(f"largest of its limit: {shares}", highlight=False)
-                console.print(f"picture in {data['figure']}", highlight=False, soft_wrap=True)
+            for source, answer in zip(sources, answers, strict=True):
+                console.print(_response_table(answer, source.tunnel))
+                if given is not None:
+                    shares = ", ".join(
+                        f"{check.replace('_', ' ')} {share:.2f}" for check, share in answer["utilisations"].items()
+                    )
+                    console.print(f"largest of its limit: {shares}", highlight=False)
+                    console.print(f"picture in {answer['figure']}", highlight=False, soft_wrap=True)
+                console.print(f"response in {answer['file']}", highlight=False, soft_wrap=True)
 
 
 @app.command("compare")
@@ -232,22 +262,28 @@ def compare_command(
 ):
     """Compare two lining models over the whole event: largest differences with place, time and cause; figures.
 
-    JSON: `run`, `models`, `cpu_seconds`, `rows` (see `coupling.compare.compare`), `differences`, `figures` (paths).
+    Nothing in RUN changes. JSON: `run`, `models`, `cpu_seconds`, `rows` (see `coupling.compare.compare`),
+    `differences`, `responses`, `figures` (paths); of several tunnels that with the gate, the others under `tunnels`.
     """
-    with failures(), checked_json(json_path):
+    with failures(), checked_json(json_path), told_warnings():
         from coupling.compare import compare, store
-        from coupling.pressure_source import read_source
+        from coupling.pressure_source import read_sources
 
-        source = read_source(run, scene)
-        comparison = compare(source, first, second, open_gate)
-        data = {"run": str(run), **store(comparison, source, out)}
+        found = {}
+        for source in read_sources(run, scene):
+            # the gate is in one tunnel only
+            comparison = compare(source, first, second, open_gate if source.tunnel is None else None)
+            found[source.tunnel] = store(comparison, source, out)
+        others = {tunnel: one for tunnel, one in found.items() if tunnel is not None}
+        data = {"run": str(run), **found[None], **({"tunnels": others} if others else {})}
         write_json(json_path, data)
         if str(json_path) != "-":
             console = Console()
-            console.print(_comparison_table(data))
-            times = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in data["cpu_seconds"].items())
-            console.print(f"CPU time for {data['times']} times: {times}", highlight=False)
-            console.print(f"results in {Path(data['differences']).parent}", highlight=False, soft_wrap=True)
+            for tunnel, one in found.items():
+                console.print(_comparison_table(one, tunnel))
+                times = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in one["cpu_seconds"].items())
+                console.print(f"CPU time for {one['times']} times: {times}", highlight=False)
+                console.print(f"results in {Path(one['differences']).parent}", highlight=False, soft_wrap=True)
 
 
 @app.command("scenes")
@@ -367,9 +403,12 @@ def _run_table(data):
         ("inflow mass", f"{data['inflow_mass']:.0f} kg/m"),
         ("flow zone, disturbed zone", f"{data['flow_zone_area']:.1f}, {data['disturbed_area']:.1f} m²"),
     ]
-    for name, label in (("soil_pressure", "soil pressure"), ("water_pressure", "water pressure")):
-        for place, values in data.get(name, {}).items():
-            rows.append((f"{label}, {place}", f"{values['initial'] / 1e3:.0f} -> {values['final'] / 1e3:.0f} kPa"))
+    for tunnel, one in {None: data, **data["tunnels"]}.items():
+        where = "" if tunnel is None else f", tunnel {tunnel}"
+        for name, label in (("soil_pressure", "soil pressure"), ("water_pressure", "water pressure")):
+            for place, values in one.get(name, {}).items():
+                pressure = f"{values['initial'] / 1e3:.0f} -> {values['final'] / 1e3:.0f} kPa"
+                rows.append((f"{label}, {place}{where}", pressure))
     rows += [
         ("steps, mean dt", f"{data['steps']}, {1e6 * data['mean_dt']:.0f} µs ({data['dt_limit']})"),
         ("point-steps per CPU second", f"{data['point_steps_per_cpu_second'] / 1e6:.1f} million"),
@@ -380,8 +419,8 @@ def _run_table(data):
     return table
 
 
-def _response_table(data):
-    table = Table("ring", "initial", "final")
+def _response_table(data, tunnel=None):
+    table = Table("ring" if tunnel is None else f"ring of tunnel {tunnel}", "initial", "final")
     for name, label, unit in (
         ("axial_force", "N", "kN/m"),
         ("shear_force", "Q", "kN/m"),
@@ -402,10 +441,10 @@ def _response_table(data):
     return table
 
 
-def _comparison_table(data):
+def _comparison_table(data, tunnel=None):
     first, second = data["models"]
     table = Table("quantity", "largest difference", "of the extreme", "where", "when", "known cause")
-    table.title = f"{second} less {first}"
+    table.title = f"{second} less {first}{'' if tunnel is None else f', tunnel {tunnel}'}"
     for row in data["rows"]:
         where = f"joint {row['joint']}" if row["joint"] is not None else f"{row['theta']:.4g} deg"
         table.add_row(

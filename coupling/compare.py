@@ -5,11 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coupling.datasets import write_dataset, write_response
+from coupling.datasets import stored_title, write_dataset
 from coupling.provenance import origin, with_history
 from coupling.run_folder import RunRefused
 
 FOLDER, DIFFERENCES = "comparison", "differences.nc"
+TITLE = "differences between lining models"
 
 #: Name: (label, unit shown, factor to it from SI).
 QUANTITIES = {
@@ -100,33 +101,38 @@ def compare(source, first="beam-spring", second="continuum", open_gate=None):
 
 
 def store(comparison, source, out=None):
-    """Write differences, figures and, with a run, the responses; returns what a table or JSON needs.
+    """Write differences, both responses and figures into a folder; returns what a table or JSON needs.
 
     Parameters
     ----------
     comparison : Comparison
     source : coupling.pressure_source.Source
     out : path, optional
-        `comparison/` beside the file when left out; only files of an earlier comparison are replaced.
+        `comparison/` beside the file when left out; only files of an earlier comparison are replaced. Tunnels without
+        the gate have folders of their own in it.
 
     Returns
     -------
     dict
-        models, times (count), cpu_seconds, rows, differences (path), figures (paths).
+        models, times (count), cpu_seconds, rows, differences (path), responses (paths by model), figures (paths).
+
+    Raises
+    ------
+    RunRefused
+        The folder cannot be made, or holds other files under the names that are written.
     """
     from coupling.compare_figures import forces_compared, joints_compared
     from coupling.figures import RESOLUTION
 
     folder = source.file.parent / FOLDER if out is None else out
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except FileExistsError:
-        raise RunRefused(f"output folder '{folder}': it, or one above it, is a file; choose another --out") from None
-    if source.is_run:
-        for name, response in comparison.responses.items():
-            write_response(source.file, response, name)
+    if source.tunnel is not None:
+        folder = folder / f"tunnel-{source.tunnel}"
     path = folder / DIFFERENCES
+    responses = {name: folder / f"{name}.nc" for name in comparison.responses}
+    _claim(folder, (path, *responses.values(), folder / "forces.png", folder / "joints.png"))
     write_dataset(path, comparison.differences)
+    for name, response in comparison.responses.items():
+        write_dataset(responses[name], response)
     figures = []
     drawings = {"forces": forces_compared(comparison.responses)}
     if next(iter(comparison.responses.values())).sizes["joint"]:
@@ -140,8 +146,22 @@ def store(comparison, source, out=None):
         "cpu_seconds": comparison.cpu_seconds,
         "rows": comparison.rows,
         "differences": str(path),
+        "responses": {name: str(file) for name, file in responses.items()},
         "figures": figures,
     }
+
+
+def _claim(folder, files):
+    """Make the folder; refuse one in which a file would be replaced that no earlier comparison wrote."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise RunRefused(f"output folder '{folder}': it, or one above it, is a file; choose another --out") from None
+    there = [file.name for file in files if file.exists()]
+    if there and not stored_title(folder / DIFFERENCES).startswith(TITLE):
+        raise RunRefused(
+            f"output folder '{folder}': holds {there[0]}, which is not of an earlier comparison; choose another --out"
+        )
 
 
 def _gate_options(source, cut):
@@ -197,7 +217,7 @@ def _differences(first, second, ring):
     dataset.attrs = {
         **origin(),
         "Conventions": "CF-1.11",
-        "title": f"differences between lining models: {models}",
+        "title": f"{TITLE}: {models}",
         "history": with_history("", "lining models compared"),
     }
     return dataset

@@ -478,10 +478,20 @@ def read_run(path):
 def _group_names(file):
     import h5netcdf
 
+    from structure.models import in_order
+
     with _shown(file) as shown, h5netcdf.File(shown, "r") as content:
         answered = [name for name in content.groups if name.startswith("structure")]
         names = [name for name in content.groups if name not in answered]
-        return names + [f"{name}/{model}" for name in answered for model in content[name].groups]
+        return names + [f"{name}/{model}" for name in answered for model in in_order(content[name].groups)]
+
+
+def stored_title(path):
+    """Title of a netCDF-4 file, by which its kind is known; empty where there is no such file or it has none."""
+    try:
+        return str(_read(Path(path), None).attrs.get("title", ""))
+    except RunFileError:
+        return ""
 
 
 def read_attributes(path):

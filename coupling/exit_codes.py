@@ -6,6 +6,7 @@ Exit codes: 0 done, 1 rerun differs, 2 refused input, 3 run failed, 130 interrup
 import contextlib
 import json
 import sys
+import warnings
 from pathlib import Path
 from typing import Annotated
 
@@ -86,6 +87,22 @@ def complain(message, code):
     """Print a message to standard error and leave with an exit code."""
     Console(stderr=True).print(plain(message), style="red", markup=False, highlight=False, soft_wrap=True)
     raise typer.Exit(code)
+
+
+@contextlib.contextmanager
+def told_warnings():
+    """Print what Python warns of in the block as the program's own warnings, each once."""
+    told = set()
+
+    def show(message, *_, **__):
+        if str(message) not in told:
+            told.add(str(message))
+            warn(message)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", UserWarning)
+        warnings.showwarning = show
+        yield
 
 
 def warn(message):

@@ -36,7 +36,7 @@ CONCRETE = "0.82"
 FIELD_COLOURS = ("viridis", "magma_r", "YlGnBu", "cividis")  # of displacement, strain, pore pressure, stress
 
 
-def fields_around_tunnel(points, half_width=None, tops=None):
+def fields_around_tunnel(points, half_width=None, tops=None, tunnel=None):
     """Displacement, deviatoric strain, pore pressure, vertical effective stress (compression positive) on the points.
 
     Parameters
@@ -47,9 +47,11 @@ def fields_around_tunnel(points, half_width=None, tops=None):
         Half the width of the view [m]; three outer radii when left out.
     tops : dict, optional
         Title of a panel to the top of its colours, from :func:`common_tops`; that of this time when left out.
+    tunnel : int, optional
+        Which one, when there are several; that of the gate when left out.
     """
     geometry = _Geometry(points)
-    x0, y0, radius = geometry.centre
+    x0, y0, radius = geometry.centre if tunnel is None else geometry.centre_of(tunnel)
     half = 3.0 * radius if half_width is None else half_width
     data, fields = _fields(points, x0, y0, half)
     with matplotlib.rc_context(STYLE):
@@ -351,7 +353,11 @@ def _of_tunnel(run, tunnel):
     def response():
         return read_response(run, tunnel=tunnel)
 
+    def fields(points):
+        return fields_around_tunnel(points, tunnel=tunnel)
+
     return {
+        f"fields_tunnel_{tunnel}": (fields, lambda: read_points(run, -1)),
         f"pressures_tunnel_{tunnel}": (pressures, lambda: read_pressures(run)),
         f"internal_forces_tunnel_{tunnel}": (internal_forces, response),
         f"deformed_ring_tunnel_{tunnel}": (deformed_ring, response),
@@ -376,7 +382,11 @@ class _Geometry:
     @property
     def centre(self):
         """Axis (x, y) and outer radius of the gate's tunnel [m]."""
-        x, depth, outer, _ = self.tunnels[self.tunnel]
+        return self.centre_of(self.tunnel)
+
+    def centre_of(self, tunnel):
+        """Axis (x, y) and outer radius of a tunnel [m]."""
+        x, depth, outer, _ = self.tunnels[tunnel]
         return float(x), -float(depth), float(outer)
 
     @property

@@ -146,7 +146,7 @@ def _scene(path):
         scene = load_scene(path)
     except SceneError as error:
         try:
-            tomllib.loads(path.read_text(encoding="utf-8"))
+            tomllib.loads(path.read_text(encoding="utf-8-sig"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError):
             return {"kind": "not a file of this program", "facts": {"why": "no valid TOML"}}
         return {"kind": "TOML file that is no valid scene", "facts": {"why": str(error)}}

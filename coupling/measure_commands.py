@@ -133,8 +133,7 @@ def study_command(
 ):
     """Run many scenes that differ in some parameters, in parallel; one dataset of them all. Rerun to resume.
 
-    JSON: `study`, `folder`, `data` (netCDF file), `cases`: list of {case, parameters, status, message, cpu_seconds [s],
-    time [s]: of the last inflow mass reached}.
+    JSON: keys of `coupling.studies.command.run_study`.
     """
     with failures(), checked_json(json_path):
         from coupling.studies.command import run_study
@@ -158,10 +157,18 @@ def _accuracy_table(data):
 
 
 def _study_table(data):
-    names = list(data["cases"][0]["parameters"])
-    table = Table("case", *names, "status", "CPU s", "time [s]".replace("[", "\\["), title=data["study"])
+    table = Table(title=f"{data['study']}{', ' + data['model'] if data['model'] else ''}")
+    table.add_column("case", min_width=min(22, max(len(case["name"]) for case in data["cases"])))
+    for head in ("kg/m", "after s", "N max kN/m", "M kN m/m", "CPU s"):
+        table.add_column(head, no_wrap=True)
+    table.add_column("status")
     for case in data["cases"]:
-        values = [f"{v:.4g}" if isinstance(v, float) else str(v) for v in case["parameters"].values()]
-        numbers = [f"{case['cpu_seconds']:.0f}", f"{case['time']:.3g}"] if case["status"] == "finished" else ["", ""]
-        table.add_row(str(case["case"]), *values, case["message"] or case["status"], *numbers)
+        cells = [""] * 5
+        if case["status"] == "finished":
+            force, moment = case["axial_force"], case["bending_moment"]
+            cells = [f"{case['inflow_mass']:.4g}", f"{case['time']:.3g}"]
+            cells += [f"{force['max'] / 1e3:.0f}" if force else "-"]
+            cells += [f"{moment['min'] / 1e3:.0f} to {moment['max'] / 1e3:.0f}" if moment else "-"]
+            cells += [f"{case['cpu_seconds']:.1f}"]
+        table.add_row(case["name"], *cells, case["message"] or case["status"])
     return table

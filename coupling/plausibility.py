@@ -74,6 +74,7 @@ def warnings_of(scene):
     if scene.ring is not None:
         data["ring"] = scene.ring.model_dump(exclude_none=True)
     told = [f"{shown(path)} {hint}" for path, hint in hints(data).items() if not _follows(path, data)]
+    told += _other_rings(scene)
     stop, output = scene.mpm.stop, scene.mpm.output
     if stop.time is not None and output.interval >= stop.time:
         told.append(
@@ -81,6 +82,18 @@ def warnings_of(scene):
             f"last state are recorded; write e.g. {stop.time / 100:g}"
         )
     return told
+
+
+def _other_rings(scene):
+    """Where a ring is taken for a tunnel of other diameters than those of [ring]."""
+    ring, own = scene.ring, scene.mpm.gate.tunnel if scene.mpm.gate is not None else 0
+    return [
+        f"tunnels[{k}] is not as wide as tunnel {own}, which [ring] describes: its ring is taken with the concrete and "
+        "joints of [ring] and its own diameters; leave its forces aside if it is built otherwise"
+        for k, tunnel in enumerate(scene.mpm.tunnels)
+        if ring is not None and k != own
+        and (tunnel.outer_diameter, tunnel.inner_diameter) != (ring.outer_diameter, ring.inner_diameter)
+    ]  # fmt: skip
 
 
 def hints(data):

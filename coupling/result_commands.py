@@ -15,6 +15,9 @@ Run = Annotated[Path, typer.Argument(help="Folder (or run.nc) of a run, also one
 def report_command(
     path: Annotated[Path, typer.Argument(help="Folder of a run (or its run.nc) or of a study, also one that goes on.")],
     out: Annotated[Path | None, typer.Option(help="The HTML file; report.html in the folder when left out.")] = None,
+    model: Annotated[
+        str | None, typer.Option(help="Lining model whose numbers lead; the run's own when left out.")
+    ] = None,
     runs: Annotated[bool, typer.Option("--runs", help="Of a study: also write the page of every run.")] = False,
     json_path: JsonPath = None,
 ):
@@ -30,7 +33,7 @@ def report_command(
         if runs and folder is None:
             raise RunRefused(f"--runs: '{path}' must be a study, it is a run; leave --runs out")
         of_runs = write_run_reports(folder) if runs else []
-        page = write_report(path, out)
+        page = write_report(path, out, model)
         data = {"run" if folder is None else "study": str(path), "report": str(page), "bytes": page.stat().st_size}
         if runs:
             data["runs"] = [str(file) for file in of_runs]

@@ -9,6 +9,8 @@ from coupling.plausibility import warnings_of
 from coupling.recorded_simulation import RecordedSimulation, write_quality
 from coupling.resume import find_remains
 from coupling.run_folder import FIGURES, LOG_FILE, RUN_FILE, RunRefused, claimed, default_folder, reopened
+from coupling.scene import SceneError, ring_of
+from structure.models import model_name
 
 BYTES_PER_ELEMENT = 2000  # points, buffers and the copy made while sorting, of a case with 3 points an element
 
@@ -112,8 +114,10 @@ def finish(scene, folder, progress):
     return draw_run(folder, folder / FIGURES)
 
 
-def respond(scene, pressures, backend="beam-spring"):
-    """Response of the scene's ring to the pressures on the tunnel with the gate, by the lining model of that name.
+def respond(scene, pressures, backend="beam-spring", tunnel=None):
+    """Response of the scene's ring to the pressures on a tunnel, by the lining model of that name.
+
+    tunnel : int or None, None: the one with the gate.
 
     Raises
     ------
@@ -122,36 +126,30 @@ def respond(scene, pressures, backend="beam-spring"):
     structure.LiningFailure
         No equilibrium.
     """
-    if scene.ring is None:
-        raise RunRefused(f"scene '{scene.name}': has no [ring]; add one to get internal forces")
+    number = gate_tunnel(scene) if tunnel is None else tunnel
     if "tunnel" in pressures.dims:
-        pressures = pressures.isel(tunnel=scene.mpm.gate.tunnel if scene.mpm.gate else 0, drop=True)
-    return respond_by_name(scene.ring, pressures, backend)
+        pressures = pressures.isel(tunnel=number, drop=True)
+    try:
+        ring = ring_of(scene, number)
+    except SceneError as problem:
+        raise RunRefused(str(problem)) from None
+    return respond_by_name(ring, pressures, backend)
+
+
+def gate_tunnel(scene):
+    """Number of the tunnel with the gate, 0 without one."""
+    return scene.mpm.gate.tunnel if scene.mpm.gate else 0
 
 
 def respond_beside(scene, folder, backend="beam-spring"):
-    """Store the responses of the tunnels without the gate that have the ring's diameters; returns their numbers.
-
-    Their ground is that at their own axis; what the scene says of it stands for the tunnel with the gate.
-    """
-    from coupling.scene import ground_at_axis
-
+    """Store the responses of the tunnels without the gate, each of its own ring; returns their numbers."""
     if scene.ring is None:
         return []
-    tunnels, gate = scene.mpm.tunnels, scene.mpm.gate.tunnel if scene.mpm.gate else 0
-    answered = []
-    for k, tunnel in enumerate(tunnels):
-        diameters = (tunnel.outer_diameter, tunnel.inner_diameter)
-        if k == gate or diameters != (scene.ring.outer_diameter, scene.ring.inner_diameter):
-            continue
-        ring = scene.ring
-        if ring.ground is not None and tunnel.axis_depth != tunnels[gate].axis_depth:
-            there = ground_at_axis(scene.mpm, tunnel.axis_depth)
-            ring = ring.model_copy(update={"ground": ring.ground.model_copy(update=there)})
-        response = respond_by_name(ring, read_pressures(folder).isel(tunnel=k, drop=True), backend)
-        write_response(folder / RUN_FILE, response, backend, tunnel=k)
-        answered.append(k)
-    return answered
+    others = [k for k in range(len(scene.mpm.tunnels)) if k != gate_tunnel(scene)]
+    for k in others:
+        response = respond(scene, read_pressures(folder), backend, k)
+        write_response(folder / RUN_FILE, response, model_name(backend), tunnel=k)
+    return others
 
 
 def respond_by_name(ring, pressures, backend, **options):

@@ -1,7 +1,8 @@
 """Scenes for users: ground, tunnels and gate for the MPM together with the ring for the structure.
 
 A scene is a TOML file, or the name of a built-in one; ``base = "case-3"`` takes over everything that the file does not
-say itself (tables are merged, lists are replaced). What ``[ring]`` leaves out is computed here: the diameters from the
+say itself (tables are merged, lists are replaced; a table whose keys are numbers, as ``[soils.0]``, changes entries of
+a list). What ``[ring]`` leaves out is computed here: the diameters from the
 tunnel with the gate, ``[ring.ground]`` from the soil at that tunnel's axis (see `ground_at_axis`).
 """
 
@@ -16,10 +17,11 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError, model_validator
 
 from coupling.plausibility import hints, shown
-from coupling.scene_lines import holds, line_of, path_of
+from coupling.ring_units import ring_in_si, ring_number
+from coupling.scene_lines import entry_at, holds, line_of, path_of
 from mpm.scene import Scene as MpmScene
 from structure.ring import Ring
 
@@ -114,7 +116,8 @@ def load_scene(name: str | Path, /, **changes: Any) -> Scene:
     name : str or path
         A name of `scene_names`, or a file.
     **changes
-        Tables or values that replace those of the file, for instance ``stop={"inflow_mass": 50.0}``.
+        Tables or values that replace those of the file, for instance ``stop={"inflow_mass": 50.0}``; or dotted names,
+        as ``**{"soils.0.friction_angle": 33}``, which change one value.
 
     Returns
     -------
@@ -127,9 +130,9 @@ def load_scene(name: str | Path, /, **changes: Any) -> Scene:
     """
     layers = _read(str(name), ())
     _check_levels(changes, f"changes of scene {str(name)!r}")
-    data = _merge(_merged(layers), changes)
     # changes come from no file: a layer without a text keeps the lines of the files from being blamed
-    return make_scene(data, str(name), (Layer(CHANGES, "", changes), *layers) if changes else layers)
+    layers = (*(Layer(CHANGES, "", nested(key, value)) for key, value in reversed(changes.items())), *layers)
+    return make_scene(_merged(layers), str(name), layers)
 
 
 def read_scene_data(name: str | Path) -> dict[str, Any]:
@@ -193,8 +196,10 @@ def make_scene(data: dict[str, Any], origin: str = "scene", layers: tuple[Layer,
             problems.append((("ring",), f"must be a table, got {_short(ring_data)}; write [ring] with its keys below"))
         else:
             derived = {} if mpm_scene is None else derived_ring(mpm_scene)
+            ring_data, mistakes = ring_in_si(ring_data)
+            problems += mistakes
             try:
-                ring = Ring.model_validate(_merge(derived, ring_data))
+                ring = Ring.model_validate(changed(derived, ring_data)) if not mistakes else None
             except ValidationError as error:
                 # Without a valid ground there is nothing to derive the missing keys from.
                 problems += _messages(error, Ring, ("ring",), silent=() if derived else DERIVED)
@@ -219,6 +224,31 @@ def derived_ring(scene: MpmScene) -> dict[str, Any]:
         "inner_diameter": tunnel.inner_diameter,
         "ground": ground_at_axis(scene, tunnel.axis_depth),
     }
+
+
+def ring_of(scene: Scene, tunnel: int) -> Ring:
+    """The ring of a tunnel: that of the scene for the tunnel with the gate (else the first), the same concrete and
+    joints with the tunnel's own diameters and the ground at its own axis for any other.
+
+    Raises
+    ------
+    SceneError
+        No ring, or joints that the other diameters do not take.
+    """
+    if scene.ring is None:
+        raise SceneError(f"scene '{scene.name}': has no [ring]; add one to get internal forces")
+    own = scene.mpm.gate.tunnel if scene.mpm.gate is not None else 0
+    if tunnel == own:
+        return scene.ring
+    there, home = scene.mpm.tunnels[tunnel], scene.mpm.tunnels[own]
+    values = scene.ring.model_dump() | {"outer_diameter": there.outer_diameter, "inner_diameter": there.inner_diameter}
+    if values["ground"] is not None and there.axis_depth != home.axis_depth:
+        values["ground"] |= ground_at_axis(scene.mpm, there.axis_depth)
+    try:
+        return Ring.model_validate(values)
+    except ValidationError as error:
+        said = "; ".join(message for _, message in _messages(error, Ring, ()))
+        raise SceneError(f"scene '{scene.name}', ring of tunnel {tunnel}: {said}") from None
 
 
 def ground_at_axis(scene: MpmScene, depth: float) -> dict[str, float]:
@@ -277,10 +307,72 @@ def _read(name: str, chain: tuple[str, ...]) -> tuple[Layer, ...]:
     return (layer, *_read(base if base in scene_names() or not _is_there(beside) else str(beside), (*chain, name)))
 
 
+def nested(name: str, value: Any) -> dict[str, Any]:
+    """A value under its dotted name as nested tables, for :func:`changed`.
+
+    >>> nested("soils.0.k0", 0.5)
+    {'soils': {'0': {'k0': 0.5}}}
+    """
+    for part in reversed(name.split(".")):
+        value = {part: value}
+    return value
+
+
+def number_in_unit(name: str, value: Any) -> Any:
+    """A string with a unit as the number that the key of that dotted name takes; anything else as it is.
+
+    Raises
+    ------
+    ValueError
+        As :func:`mpm.scene.quantity_in`.
+    """
+    parts = [part for part in name.split(".") if not part.isdecimal()]
+    try:
+        if parts[0] == "ring":
+            return ring_number(tuple(parts), value)
+        model = MpmScene
+        for part in parts[:-1]:
+            model = next(_models_in(model.model_fields[part].annotation))
+        field = model.model_fields[parts[-1]]
+    except (KeyError, StopIteration):
+        return value  # no such key: the scene says so
+    kinds = (field, *getattr(field.annotation, "__args__", ()))
+    metadata = [each for kind in kinds for each in getattr(kind, "metadata", getattr(kind, "__metadata__", ()))]
+    for validator in metadata:
+        if isinstance(validator, BeforeValidator):
+            return validator.func(value)
+    return value
+
+
+def parse_changes(texts: list[str]) -> dict[str, Any]:
+    """Changes for :func:`load_scene` from texts as "gate.angle=45", "gate.width=20 cm" or "water=none".
+
+    Raises
+    ------
+    SceneError
+        A text without a name or a value.
+    """
+    found = {}
+    for text in texts:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not (name and equals and value):
+            raise SceneError(f"--set {_short(text)}: must be NAME=VALUE; write it like --set gate.angle=45")
+        try:
+            found[name] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:  # a name or a quantity without quotes, as the shell hands it over
+            found[name] = value
+    return found
+
+
 def _merged(layers: tuple[Layer, ...]) -> dict[str, Any]:
     data: dict[str, Any] = {}
+    file = ""
     for layer in reversed(layers):
-        data = _merge(data, layer.data)
+        file = file if layer.name == CHANGES else layer.name
+        try:
+            data = changed(data, layer.data)
+        except SceneError as problem:
+            raise SceneError(f"scene {file!r}: {problem}") from None
     return data
 
 
@@ -295,7 +387,8 @@ def parse_toml(text: str, who: str) -> dict[str, Any]:
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"{who}: must be valid TOML, got: {error}; is the file truncated?") from None
+        remedy = "is the file truncated?" if "at end of document" in str(error) else "correct that place"
+        raise SceneError(f"{who}: must be valid TOML, got: {error}; {remedy}") from None
     except RecursionError:
         raise SceneError(f"{who}: must not nest brackets hundreds deep; this is no scene file") from None
     except ValueError as error:
@@ -347,7 +440,7 @@ def read_toml_file(path: Path, who: str) -> str:
         size = path.stat().st_size
         if size > MOST_BYTES:
             raise SceneError(f"{who}: must be shorter than 1 MB, got {size} bytes; this is no scene file")
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")  # editors of Windows begin a text with a byte order mark
     except OSError as error:
         raise SceneError(f"{who}: must be a readable file, got: {error.strerror}; check path and rights") from None
     except UnicodeDecodeError as error:
@@ -359,15 +452,42 @@ OPTIONAL_TABLES = ("water", "gate", "ring")
 NONE = "none"
 
 
-def _merge(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+def changed(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """The nested dictionary of a scene with that of some changes merged into it, see the module's description.
+
+    Raises
+    ------
+    SceneError
+        A list is asked for an entry that it does not have.
+    """
     merged = dict(base)
     for key, value in changes.items():
         if value == NONE and key in OPTIONAL_TABLES:
             merged.pop(key, None)
             continue
-        both = isinstance(value, dict) and isinstance(merged.get(key), dict)
-        merged[key] = _merge(merged[key], value) if both else value
+        here = merged.get(key)
+        if isinstance(value, dict) and isinstance(here, dict):
+            merged[key] = changed(here, value)
+        elif isinstance(value, dict) and isinstance(here, list | tuple):
+            merged[key] = _with_entries(key, here, value)
+        else:
+            merged[key] = value
     return merged
+
+
+def _with_entries(name: str, entries: list[Any] | tuple[Any, ...], changes: dict[str, Any]) -> list[Any]:
+    """A list in which the entries of some numbers, the keys of `changes`, are changed."""
+    result = list(entries)
+    for key, value in changes.items():
+        number = int(key) if str(key).isdecimal() else len(result)
+        if number >= len(result):
+            raise SceneError(
+                f"{name}.{_short(str(key))[1:-1]}: must be a number below {len(result)}, the length of that list; as "
+                f"in {name}.0"
+            )
+        here = result[number]
+        result[number] = changed(here, value) if isinstance(here, dict) and isinstance(value, dict) else value
+    return result
 
 
 def _short(value: Any) -> str:
@@ -407,7 +527,7 @@ def _source(path: tuple[Any, ...], layers: tuple[Layer, ...]) -> tuple[Layer | N
         kept = next((k for k in range(len(path), 0, -1) if holds(layer.data, path[:k])), 0)
         if kept > most:
             best, most = layer, kept
-        if list_at is not None and kept >= list_at:
+        if list_at is not None and kept >= list_at and isinstance(entry_at(layer.data, path[:list_at]), list | tuple):
             break  # a list replaces that of a base as a whole
     return best, most
 
@@ -456,7 +576,10 @@ def _messages(
     for table, names in missing.items():
         # A soil is where newcomers change one number and lose the others.
         whole = (
-            f"; [[{table[0]}]] replaces all {table[0]} of the base, so copy all keys of it" if len(table) > 1 else ""
+            f"; [[{table[0]}]] replaces all {table[0]} of the base, so copy all keys of it, or change the entry of the "
+            f"base by [{table[0]}.{table[1]}]"
+            if len(table) > 1
+            else ""
         )
         them = "it decides the answer and has" if len(names) == 1 else "they decide the answer and have"
         text = f"{', '.join(names)} missing; {them} {advice}{whole}"

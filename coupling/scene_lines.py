@@ -41,9 +41,10 @@ def line_of(text, path):
 
 
 def holds(data, path):
-    """Whether nested dictionaries and lists have an entry at `path`."""
+    """Whether nested dictionaries and lists have an entry at `path`; a table may name entries of a list by number."""
     for part in path:
         if isinstance(data, dict):
+            part = str(part)
             if part not in data:
                 return False
         elif not (isinstance(data, list) and isinstance(part, int) and part < len(data)):
@@ -65,7 +66,7 @@ def path_of(message, location, data):
         The scene.
     """
     path = tuple(location)
-    table = _at(data, path)
+    table = entry_at(data, path)
     if not path:
         head = re.match(r"(\w+?)s?\b(?: (?:'([^']*)'|(\d+)))?", message)
         name, called, number = head.groups() if head else ("", None, None)
@@ -78,14 +79,15 @@ def path_of(message, location, data):
             path = (f"{name}s", index) if index < len(entries) else (f"{name}s",)
         elif entries is not None:
             path = (f"{name}s",)
-        table = _at(data, path)
+        table = entry_at(data, path)
     if isinstance(table, dict):
         key = next((word for word in re.findall(r"\w+", message) if word in table), None)
         path = (*path, key) if key is not None else path
     return path
 
 
-def _at(data, path):
+def entry_at(data, path):
+    """The entry at `path` of nested dictionaries and lists; None where there is none."""
     for part in path:
         try:
             data = data[part]

@@ -19,7 +19,8 @@ def summarise_run(run):
         steps; point_steps; mean_dt [s]; dt_limit; max_velocity [m/s]; grain_mass_error [-]: largest relative
         departure from the initial grain mass; wall_seconds, cpu_seconds, point_steps_per_cpu_second; clamps: updates
         at which each limit acted; quality: see :func:`coupling.quality.quality`; soil_pressure, water_pressure [Pa]:
-        place to {initial, final}.
+        place to {initial, final}, of the tunnel with the gate; tunnels: number of any other to the same two and
+        `response`, None.
     """
     attributes, history, pressures = read_attributes(run), read_history(run), read_pressures(run)
     data = {
@@ -32,7 +33,7 @@ def summarise_run(run):
         if name in attributes:
             data[name] = float(attributes[name])
     if not data["records"]:
-        return data
+        return data | {"tunnels": {}}
     last = history.isel(time=-1)
     mass = history["grain_mass"].values
     limits = history["dt_limit"].attrs["flag_meanings"].split()
@@ -49,18 +50,30 @@ def summarise_run(run):
         "clamps": {name: int(last[f"clamp_{name}"]) for name in CLAMPS},
         "quality": quality(history),
     }
+    data["tunnels"] = {}
+    if "tunnel" in pressures.dims:
+        gate = int(pressures.attrs.get("gate_tunnel", 0))
+        for k in range(pressures.sizes["tunnel"]):
+            if k != gate:
+                data["tunnels"][k] = _at_places(pressures.isel(tunnel=k)) | {"response": None}
+        pressures = pressures.isel(tunnel=gate)
     if "soil_pressure" in pressures:
-        if "tunnel" in pressures.dims:
-            pressures = pressures.isel(tunnel=int(pressures.attrs.get("gate_tunnel", 0)))
-        for name in ("soil_pressure", "water_pressure"):
-            data[name] = {
-                place: {
-                    "initial": float(pressures[name].isel(time=0).sel(theta=theta)),
-                    "final": float(pressures[name].isel(time=-1).sel(theta=theta)),
-                }
-                for place, theta in PLACES.items()
-            }
+        data |= _at_places(pressures)
     return data
+
+
+def _at_places(pressures):
+    """Pressures of one tunnel [Pa]: name to place to {initial, final}."""
+    return {
+        name: {
+            place: {
+                "initial": float(pressures[name].isel(time=0).sel(theta=theta)),
+                "final": float(pressures[name].isel(time=-1).sel(theta=theta)),
+            }
+            for place, theta in PLACES.items()
+        }
+        for name in ("soil_pressure", "water_pressure")
+    }
 
 
 def summarise_response(response):

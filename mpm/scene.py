@@ -8,7 +8,7 @@ middle of the box. Numbers that decide the answer have no default; numerical one
 import math
 import os
 import re
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
@@ -21,6 +21,7 @@ _QUANTITY = re.compile(
     rf"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*"
     rf"((?:1?\s*/\s*)?{_UNIT}(?:\s*[*/·]\s*{_UNIT}|\s+{_UNIT})*)\s*"
 )
+_DECIMAL_COMMA = re.compile(r"([0-9]),([0-9])")
 MOST_RECORDS = 1_000_000
 _HOUR = 3600.0
 #: Smallest (outer - inner) / outer diameter: the channel through a thinner lining has no length to mesh.
@@ -34,24 +35,34 @@ def _unit_registry():
     return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
 
 
+def quantity_in(unit: str, value: Any) -> Any:
+    """A string with a unit as the number in `unit`, converted by pint; anything else as it is.
+
+    Raises
+    ------
+    ValueError
+        No quantity, or of another dimension: rule, value, remedy.
+    """
+    if not isinstance(value, str):
+        return value
+    given, why = value if len(value) <= 40 else f"{value[:40]}..", ""
+    if _DECIMAL_COMMA.search(given):
+        point = _DECIMAL_COMMA.sub(r"\1.\2", given)
+        raise ValueError(f"must have a decimal point, got {given!r} with a comma; write it like {point!r}")
+    parts = _QUANTITY.fullmatch(value) if len(value) <= 60 else None
+    if parts is not None:
+        text = re.sub(r"(?:\*\*|\^)?(-?[0-9])", r"**\1", parts[2].replace("·", "*").removeprefix("1").lstrip())
+        try:
+            quantity = _unit_registry().Quantity(float(parts[1]), f"1{text}" if text.startswith("/") else text)
+            return quantity.to(unit).magnitude
+        except Exception as error:
+            why = f": {error}"
+    raise ValueError(f"must be a quantity in {unit}, got {given!r}{why}; write it like '20 {unit}'")
+
+
 def in_unit(unit: str) -> BeforeValidator:
-    """Lets a float field in `unit` also take a string with a unit, converted by pint."""
-
-    def convert(value: Any) -> Any:
-        if not isinstance(value, str):
-            return value
-        given, why = value if len(value) <= 40 else f"{value[:40]}..", ""
-        parts = _QUANTITY.fullmatch(value) if len(value) <= 60 else None
-        if parts is not None:
-            text = re.sub(r"(?:\*\*|\^)?(-?[0-9])", r"**\1", parts[2].replace("·", "*").removeprefix("1").lstrip())
-            try:
-                quantity = _unit_registry().Quantity(float(parts[1]), f"1{text}" if text.startswith("/") else text)
-                return quantity.to(unit).magnitude
-            except Exception as error:
-                why = f": {error}"
-        raise ValueError(f"must be a quantity in {unit}, got {given!r}{why}; write it like '20 {unit}'")
-
-    return BeforeValidator(convert)
+    """Lets a float field in `unit` also take a string with a unit, see :func:`quantity_in`."""
+    return BeforeValidator(partial(quantity_in, unit))
 
 
 Length = Annotated[float, in_unit("m")]

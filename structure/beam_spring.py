@@ -41,7 +41,7 @@ class BeamSpringLining(LiningModel):
         self._unit_balance = lift / self._resultant(lift)[1]
 
     def respond(self, pressures: xr.Dataset) -> xr.Dataset:
-        ordered = check_pressures(pressures)
+        ordered = check_pressures(pressures, self.ring)
         theta = np.radians(ordered["theta"].values.astype(float))
         times = ordered["time"].values
         shear = ordered["soil_shear"].values.astype(float)
@@ -55,7 +55,7 @@ class BeamSpringLining(LiningModel):
         fields |= self._balances(displacements, slips, loads, springs)
         fields["shear_moment_residual"] = self._shear_moment_residual(fields, theta, shear, springs)
         fields |= self._movements(displacements)
-        return self._dataset(pressures, fields, times)
+        return self._dataset(ordered, fields, times)
 
     def _loads(self, theta, pressure, shear):
         """Nodal forces of pressures and weight at every time, and the uplift balanced among them."""
@@ -88,11 +88,6 @@ class BeamSpringLining(LiningModel):
         """Displacements, and the slips of the joints from which each was reached, in the order of the records."""
         equilibrium = self._equilibrium
         remembers = equilibrium.joints.remembers
-        if remembers and np.any(np.diff(times) <= 0):
-            raise ValueError(
-                "ring: times must ascend where joints slide (joint_friction_coefficient), got"
-                f" {times[int(np.argmax(np.diff(times) <= 0)) + 1]:g} s after a later one; sort the records by time"
-            )
         displacements = np.zeros_like(loads)
         slips = np.zeros((len(loads), len(self.ring.joint_angles)))
         start, before, slip = np.zeros(loads.shape[1]), np.zeros(loads.shape[1]), equilibrium.unslipped

@@ -85,8 +85,7 @@ class Limits(BaseModel):
     @classmethod
     def from_toml(cls, path: str | Path) -> Limits:
         """Limits from a TOML file with the keys above, tables ``[segment]`` and ``[capacity]``; SI units."""
-        with open(path, "rb") as file:
-            return cls.model_validate(tomllib.load(file))
+        return cls.model_validate(tomllib.loads(Path(path).read_text(encoding="utf-8-sig")))
 
 
 def check(response: xr.Dataset, limits: Limits) -> xr.Dataset:

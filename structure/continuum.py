@@ -143,7 +143,7 @@ class ContinuumLining(LiningModel):
         return self._equilibrium.residuals
 
     def respond(self, pressures: xr.Dataset) -> xr.Dataset:
-        ordered = check_pressures(pressures)
+        ordered = check_pressures(pressures, self.ring)
         times = ordered["time"].values
         unknowns, loads, balanced = self._solve(ordered)
         displacements = (self._to_nodes @ unknowns.T).T
@@ -153,7 +153,7 @@ class ContinuumLining(LiningModel):
         fields |= self._balances(unknowns, loads)
         fields["shear_moment_residual"] = self._shear_moment_residual(fields, ordered, unknowns)
         fields |= self._movements(displacements)
-        response = self._dataset(pressures, fields, times)
+        response = self._dataset(ordered, fields, times)
         if self.bolts is not None:
             response["joint_bolt_force"] = ("time", "joint"), self._bolt_force(unknowns), BOLT_FORCE
         return response
@@ -172,7 +172,7 @@ class ContinuumLining(LiningModel):
             stress_rr, stress_tt, stress_rt (time, point) [Pa]; x to the right, y up from the axis [m], theta [degree],
             radius [m] and element (point).
         """
-        ordered = check_pressures(pressures)
+        ordered = check_pressures(pressures, self.ring)
         displacements = (self._to_nodes @ self._solve(ordered)[0].T).T
         stress = self._stress
         values = (stress.radial, stress.hoop, stress.shear)
@@ -193,7 +193,7 @@ class ContinuumLining(LiningModel):
             name: ("point", values, {"units": units, "long_name": long_name})
             for name, (values, units, long_name) in places.items()
         }
-        coordinates["time"] = ("time", ordered["time"].values, dict(pressures["time"].attrs))
+        coordinates["time"] = ("time", ordered["time"].values, dict(ordered["time"].attrs))
         attributes = {"title": "stresses in the lining: continuum model"} | self._attributes()
         return xr.Dataset(fields, coords=coordinates, attrs=attributes)
 

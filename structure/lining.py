@@ -21,7 +21,9 @@ from abc import ABC, abstractmethod
 import numpy as np
 import xarray as xr
 
-PRESSURES = ("soil_pressure", "water_pressure", "soil_shear")
+from structure.pressures import PRESSURES, check_pressures
+
+__all__ = ["PRESSURES", "check_pressures"]  # of `structure.pressures`, for models
 
 #: name: (dimensions, units, long name)
 RESPONSE = {
@@ -99,42 +101,6 @@ class LiningModel(ABC):
         LiningFailure
             No equilibrium at some time.
         """
-
-
-def check_pressures(pressures: xr.Dataset) -> xr.Dataset:
-    """The three pressure variables, (time, theta), angles ascending; or a message with rule, name, value and remedy."""
-    missing = [name for name in PRESSURES if name not in pressures]
-    if missing:
-        raise ValueError(
-            f"pressures: {', '.join(missing)} must be given, got {sorted(map(str, pressures.data_vars))};"
-            " add zeros for an action that is absent"
-        )
-    for name in PRESSURES:
-        variable = pressures[name]
-        if set(variable.dims) != {"time", "theta"}:
-            raise ValueError(
-                f"pressures: {name} must have the dimensions (time, theta), got {variable.dims};"
-                " select one tunnel, or expand_dims(time=[0.0]) for a single state"
-            )
-        units = variable.attrs.get("units", "Pa")
-        if units != "Pa":
-            raise ValueError(f"pressures: {name} must be in Pa, got {units!r}; convert it")
-        bad = int((~np.isfinite(variable.values)).sum())
-        if bad:
-            raise ValueError(f"pressures: {name} must be finite, got {bad} values that are not; drop those times")
-    for name in ("time", "theta"):
-        if name not in pressures.coords:
-            raise ValueError(f"pressures: coordinate {name} must be given, got none; assign_coords({name}=...)")
-    if pressures.sizes["time"] == 0:
-        raise ValueError("pressures: time must have at least one record, got none; wait for the first output")
-    ordered = pressures[list(PRESSURES)].transpose("time", "theta").sortby("theta")
-    theta = ordered["theta"].values
-    if len(theta) < 8 or theta[0] < 0 or theta[-1] >= 360 or np.diff(theta).min() <= 0:
-        raise ValueError(
-            f"pressures: theta must hold at least 8 different angles in [0, 360) degrees, got {len(theta)} between"
-            f" {theta[0]:g} and {theta[-1]:g}; take them modulo 360 and drop the repeated one"
-        )
-    return ordered
 
 
 def response_dataset(

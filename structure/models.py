@@ -67,6 +67,16 @@ def lining_model(name: str) -> type[LiningModel]:
     raise ValueError(f"lining model {name!r}: unknown; {hint}known: {', '.join(lining_model_names())}")
 
 
+def model_name(name: str) -> str:
+    """Name under which a model's responses are kept: of "FILE.py:CLASS" the class."""
+    return name.rpartition(":")[2]
+
+
+def in_order(names) -> list[str]:
+    """Names of models as they are shown: the built-in ones first, the one of a run leading, then by the alphabet."""
+    return sorted(names, key=lambda name: (list(_BUILT_IN).index(name) if name in _BUILT_IN else len(_BUILT_IN), name))
+
+
 def _installed():
     from importlib.metadata import entry_points
 

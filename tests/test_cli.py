@@ -93,6 +93,18 @@ def test_run_writes_everything_and_prints_a_table(simulated, tmp_path):
     assert json.loads((tmp_path / "b.json").read_text())["axial_force"] == data["response"]["axial_force"]
 
 
+def test_values_of_the_scene_are_set_on_the_command_line(simulated, tmp_path):
+    changes = ("--set", "gate.angle=45", "--set", "gate.width=15 cm", "--set", "soils.0.friction_angle=33")
+    result = gush("run", "quick", *changes, "--out", tmp_path / "a", "--no-figures")
+    assert result.exit_code == 0, result.output
+    scene = coupling.load_scene(tmp_path / "a" / "scene.toml").mpm
+    assert (scene.gate.angle, scene.gate.width, scene.soils[0].friction_angle) == (45.0, 0.15, 33.0)
+    refused = gush("run", "quick", "--set", "gate.angel=45", "--out", tmp_path / "b")
+    assert refused.exit_code == 2 and "did you mean 'angle'" in refused.output and not (tmp_path / "b").exists()
+    resumed = gush("run", "--resume", "--out", tmp_path / "a", "--set", "gate.angle=50")
+    assert resumed.exit_code == 2 and "--set" in resumed.output
+
+
 def test_scene_file_of_a_run_gives_the_same_scene(simulated, tmp_path):
     import coupling
 

@@ -163,9 +163,8 @@ def test_sliding_joints_remember_the_way():
 
 def test_sliding_joints_want_records_in_time_order():
     loads = pressures(3).isel(time=[0, 2, 1])
-    with pytest.raises(ValueError, match=r"times must ascend .* got 1 s after a later one"):
+    with pytest.raises(ValueError, match=r"time must increase .* got 1 s after 2 s; sortby"):
         BeamSpringLining(ring(joint_friction_coefficient=0.1)).respond(loads)
-    BeamSpringLining(ring()).respond(loads)
 
 
 @pytest.mark.parametrize("law", NONLINEAR)
@@ -180,6 +179,7 @@ def test_mirrored_pressures_give_the_mirrored_joints(law):
         np.testing.assert_allclose(other[name].values[:, ::-1], sign * one[name].values, atol=1e-6 * largest)
 
 
+@pytest.mark.filterwarnings("ignore:pressures. soil and water pull the ring outward")
 def test_open_joints_carry_nothing():
     held = ring(ground=ground(law="linear", two_way=True), joint_contact_only=True, joint_contact_height=0.35)
     loads = pressures()

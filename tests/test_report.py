@@ -61,6 +61,26 @@ def test_initial_theory_is_given_only_where_it_holds(quick_scene):
     assert numbers.initial_theory(coupling.load_scene("twin-tunnels"), theta) is None
 
 
+def test_leading_model_is_the_runs_own_or_the_one_asked_for_whichever_was_written_last(tmp_path):
+    file = write_run(tmp_path / "run.nc", models=("continuum", "beam-spring"))
+    own = {name: float(datasets.read_response(file, name)["bending_moment"].isel(time=-1).max()) for name in
+           ("beam-spring", "continuum")}  # fmt: skip
+    assert own["beam-spring"] != own["continuum"]
+
+    def leading(**asked):
+        groups = run_page.collect(file, **asked)["numbers"]
+        (title,) = [title for title in groups if title.startswith("Forces and deformation of the ring")]
+        (moment,) = [number.final for number in groups[title] if number.key == "bending_moment_max"]
+        return title.rpartition(", ")[2], moment
+
+    for last in ("beam-spring", "continuum"):
+        datasets.write_response(file, datasets.read_response(file, last), last)
+        assert leading() == ("beam-spring", own["beam-spring"])
+        assert leading(model="continuum") == ("continuum", own["continuum"])
+    result = CliRunner().invoke(app, ["report", str(file), "--model", "continum"])
+    assert result.exit_code == 2 and "there are beam-spring, continuum" in result.output.replace("\n", " ")
+
+
 def test_warnings_name_what_is_missing_or_off(run, tree, tmp_path):
     good = run_page.collect(run)
     assert [text for text in good["warnings"] if "records" not in text and "revision" not in text] == [

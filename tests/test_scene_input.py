@@ -6,8 +6,11 @@ import pytest
 from pydantic import ValidationError
 
 import coupling
-from coupling import SceneError
+import structure
+from coupling import SceneError, ring_units
+from coupling.scene import parse_changes
 from mpm.scene import Scene as MpmScene
+from structure.ring import Ground, Ring
 
 # Every published case with what sets it apart: gate angle, soil strength and stiffness, cover.
 CASES = {
@@ -234,3 +237,85 @@ def test_bad_scene_file_is_refused_with_its_name(tmp_path, content, rule):
 def test_folder_is_no_scene_file(tmp_path):
     with pytest.raises(SceneError, match="readable file"):
         coupling.load_scene(tmp_path)
+
+
+def test_one_value_of_a_list_is_changed_by_its_dotted_name(tmp_path):
+    base = coupling.load_scene("quick")
+    scene = coupling.load_scene("quick", **{"soils.0.friction_angle": 33, "gate.angle": "0.5 rad"})
+    assert scene.mpm.soils[0] == base.mpm.soils[0].model_copy(update={"friction_angle": 33.0})
+    assert scene.mpm.gate.angle == pytest.approx(math.degrees(0.5))
+    # the same in a file, whose lines are named
+    path = tmp_path / "mine.toml"
+    path.write_text('base = "quick"\n[soils.0]\nfriction_angle = 33\n')
+    assert coupling.load_scene(path).mpm.soils == scene.mpm.soils
+    path.write_text('base = "quick"\n[soils.0]\nporosity = 45\n')
+    with pytest.raises(SceneError, match=r"line 3: soils\[0\]\.porosity"):
+        coupling.load_scene(path)
+    for name in ("soils.1.k0", "soils.first.k0"):
+        with pytest.raises(SceneError, match="must be a number below 1, the length of that list"):
+            coupling.load_scene("quick", **{name: 0.5})
+
+
+def test_ring_takes_strings_with_units():
+    plain = coupling.load_scene("quick").ring
+    units = {
+        "concrete_modulus": f"{plain.concrete_modulus / 1e9} GPa",
+        "concrete_unit_weight": f"{plain.concrete_unit_weight / 1e3} kN/m3",
+        "joint_rotational_stiffness": f"{plain.joint_rotational_stiffness / 1e6} MN*m/rad/m",
+        "joint_normal_stiffness": f"{plain.joint_normal_stiffness / 1e6} MN/m",
+        "joint_angles": [f"{angle} deg" for angle in plain.joint_angles],
+        "ground": {"cohesion": "0 kPa", "friction_angle": f"{math.radians(25)} rad"},
+    }
+    ring = coupling.load_scene("quick", ring=units).ring
+    for name in ("concrete_modulus", "concrete_unit_weight", "joint_rotational_stiffness", "joint_normal_stiffness"):
+        assert getattr(ring, name) == pytest.approx(getattr(plain, name))
+    assert ring.joint_angles == pytest.approx(plain.joint_angles)
+    assert ring.ground.friction_angle == pytest.approx(25)
+    with pytest.raises(SceneError, match=r"ring\.concrete_modulus: must be a quantity in Pa, got '34 m'"):
+        coupling.load_scene("quick", ring={"concrete_modulus": "34 m"})
+
+
+def test_every_number_of_a_ring_has_a_unit_or_is_one():
+    dimensionless = {
+        "concrete_poissons_ratio", "joint_friction_coefficient", "n_elements", "poissons_ratio",
+    }  # fmt: skip
+    for model, units in ((Ring, ring_units.RING), (Ground, ring_units.GROUND)):
+        numbers = {
+            name
+            for name, field in model.model_fields.items()
+            if any(kind in str(field.annotation) for kind in ("float", "int")) and "bool" not in str(field.annotation)
+        } - {"ground"}
+        assert numbers - dimensionless == set(units)
+
+
+def test_byte_order_mark_of_an_editor_is_no_mistake(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('base = "quick"\n[gate]\nangle = 10.0\n', encoding="utf-8-sig")
+    assert coupling.load_scene(path).mpm.gate.angle == 10
+    path.write_text("joint_dislocation = 6e-3\n", encoding="utf-8-sig")
+    assert structure.Limits.from_toml(path).joint_dislocation == 6e-3
+
+
+def test_refusal_names_the_true_reason(tmp_path):
+    with pytest.raises(
+        SceneError, match=r"must have a decimal point, got '0,2 m' with a comma; write it like '0\.2 m'"
+    ):
+        coupling.load_scene("quick", gate={"width": "0,2 m"})
+    path = tmp_path / "mine.toml"
+    path.write_text('base = "quick"\n[gate]\nwidth = 0,2\nangle = 10.0\n')
+    with pytest.raises(SceneError, match=r"valid TOML.*line 3") as caught:
+        coupling.load_scene(path)
+    assert "truncated" not in str(caught.value)
+    path.write_text('base = "quick"\n[gate')
+    with pytest.raises(SceneError, match="truncated"):
+        coupling.load_scene(path)
+
+
+def test_changes_of_the_command_line_are_read_as_a_scene_says_them():
+    given = ["gate.angle=45", "gate.width = 20 cm", "water=none", "ring.joint_angles=[8, 73]"]
+    assert parse_changes(given) == {
+        "gate.angle": 45, "gate.width": "20 cm", "water": "none", "ring.joint_angles": [8, 73],
+    }  # fmt: skip
+    for text in ("gate.angle", "=45", "gate.angle="):
+        with pytest.raises(SceneError, match="must be NAME=VALUE"):
+            parse_changes([text])

@@ -3,6 +3,10 @@
 import json
 import os
 import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +19,7 @@ from coupling.studies import case as case_module
 from coupling.studies import execute
 from coupling.studies.case import at_inflow_masses
 from coupling.studies.design import Study, StudyError, cases, load_study, study_names
+from coupling.studies.pool import Pool
 from coupling.studies.progress import CaseProgress, study_state
 from coupling.studies.sensitivity import scatter, sensitivity, tornado
 
@@ -26,7 +31,7 @@ TINY = {
 }
 
 
-def made_up(source, folder, backends, records):
+def made_up(source, folder, backends, records, threads):
     """What `run_case` writes, from a formula: the moment is K0 times the angle; K0 = 0.6 at 60 degrees fails."""
     import tomllib
 
@@ -48,7 +53,7 @@ def made_up(source, folder, backends, records):
     return folder
 
 
-def suicidal(source, folder, backends, records):
+def suicidal(source, folder, backends, records, threads):
     """Kills its worker the first time, and always at 60 degrees with K0 = 0.6."""
     import tomllib
 
@@ -59,7 +64,7 @@ def suicidal(source, folder, backends, records):
         with open(mark, "w"):
             pass
         os.kill(os.getpid(), signal.SIGKILL)
-    return made_up(source, folder, backends, records)
+    return made_up(source, folder, backends, records, threads)
 
 
 @pytest.fixture
@@ -78,8 +83,8 @@ def test_designs_give_their_combinations():
     assert alone.combinations() == [
         {}, {"gate.angle": 60.0}, {"gate.angle": 90.0}, {"soils.0.k0": 0.5}, {"soils.0.k0": 0.6},
     ]  # fmt: skip
-    # what a case leaves as it is stands with it all the same
-    assert [c.parameters["soils.0.k0"] for c in cases(alone)] == [0.577, 0.577, 0.577, 0.5, 0.6]
+    # what a case leaves as it is stands with it all the same; 90 degrees are the base once more
+    assert [c.parameters["soils.0.k0"] for c in cases(alone)] == [0.577, 0.577, 0.5, 0.6]
     ranges = {
         "gate.angle": {"low": 0, "high": 180},
         "soils.0.hydraulic_conductivity": {"low": 1e-5, "high": 1e-3, "scale": "log"},
@@ -136,6 +141,17 @@ def test_ready_studies_are_valid(name):
         ({"parameters": {"soils.3.k0": [0.5]}}, "below 1, the length"),
         ({"parameters": {"soils.0.porosity": [0.4, 45.0]}}, "case 1 (soils.0.porosity = 45.0)"),
         ({"scene": "quik"}, "did you mean 'quick'"),
+        (
+            {"parameters": {"gate.angle": 45.0}},
+            "gate.angle: must be a list of values or a range, got 45.0; write [45.0]",
+        ),
+        ({"parameters": {"gate.width": ["20 kg"]}}, "must be a quantity in m, got '20 kg'"),
+        ({"parameters": {"gate.width": ["0,2 m"]}}, "write it like '0.2 m'"),
+        ({"parameters": {"soils.0.k0": [True]}}, "must not be a truth value"),
+        (
+            {"design": "sobol", "samples": 4, "parameters": {"gate.width": {"low": "1 kg", "high": 2}}},
+            "gate.width: must be a quantity in m",
+        ),
         ({"samples": 4}, "leave samples out"),
         ({"desing": "list"}, "desing"),
     ],
@@ -163,15 +179,52 @@ def test_failed_case_costs_only_itself_and_the_rest_is_not_run_again(fast, tmp_p
     assert read.sizes["case"] == 6 and read.attrs["failed"] == 1
 
 
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of the cluster's own event loop
 def test_lost_workers_cost_only_their_case(tmp_path, monkeypatch):
     monkeypatch.setattr(execute, "run_case", suicidal)
     data = coupling.study(TINY, tmp_path / "parallel", workers=2)
     assert data["status"].values.tolist() == ["finished", "failed", "finished", "finished"]
-    assert "KilledWorker" in str(data["message"].values[1])
+    assert "killed (SIGKILL" in str(data["message"].values[1])
     monkeypatch.setattr(execute, "run_case", made_up)
     serial = coupling.study(TINY, tmp_path / "serial", workers=0)
     xr.testing.assert_identical(data["bending_moment"].load(), serial["bending_moment"].load())
+
+
+def test_script_without_a_guard_runs_its_study_in_processes_and_in_silence(tmp_path):
+    script = tmp_path / "mine.py"
+    script.write_text(
+        f"import sys\nsys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+        "import coupling\nfrom small_event import COARSE\n"
+        "fixed = {f'discretisation.{name}': value for name, value in COARSE.items()}\n"
+        "fixed |= {'numerics.relaxation_tolerance': 1e-3, 'stop.time': 0.01, 'stop.inflow_mass': 1.0}\n"
+        "study = coupling.study({'name': 's', 'records': 2, 'fixed': fixed | {'output.interval': 0.005},\n"
+        "    'parameters': {'gate.angle': [60.0, 90.0, 120.0]}}, out=sys.argv[1], workers=2)\n"
+        "print(study.status.values.tolist(), study.case_name.values.tolist())\n"
+    )
+    command = [sys.executable, script, tmp_path / "out"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.stderr == "" and done.returncode == 0
+    assert done.stdout == "['finished', 'finished', 'finished'] ['angle 60', 'angle 90', 'angle 120']\n"
+
+
+def test_interrupted_study_leaves_no_process_behind(tmp_path):
+    class Stopped(Exception):
+        pass
+
+    def stop(key, ended):
+        raise Stopped
+
+    marks = [tmp_path / str(k) for k in range(2)]
+    with pytest.raises(Stopped), Pool(2) as pool:
+        for ending in pool.run(sleeper, {k: (str(mark), 0.0 if k else 60.0) for k, mark in enumerate(marks)}):
+            stop(*ending)
+    pids = [int(mark.read_text()) for mark in marks]
+    assert not [pid for pid in pids if os.path.exists(f"/proc/{pid}")]
+
+
+def sleeper(mark, seconds):
+    with open(mark, "w") as file:
+        file.write(str(os.getpid()))
+    time.sleep(seconds)
 
 
 def test_progress_of_all_cases_is_read_from_their_folders(tmp_path):
@@ -294,6 +347,83 @@ def test_sensitivity_ranks_parameters_by_their_effect():
     assert len(tornado(result).axes[0].patches) == 2 and len(scatter(data, quantity).axes) == 2
     with pytest.raises(ValueError, match="at least 3 cases"):
         sensitivity(data, quantity.where(quantity.case < 2))
+
+
+def one_at_a_time(parameters, quantity):
+    """Dataset of such a study as `coupling.study` returns it: parameters by name to their values, the base first."""
+    definition = {"name": "s", "design": "one-at-a-time", "parameters": {name: [0] for name in parameters}}
+    coords = {"case": np.arange(len(quantity)), **{name: ("case", values) for name, values in parameters.items()}}
+    data = xr.Dataset(coords=coords, attrs={"study": json.dumps(definition)})
+    return data, xr.DataArray(np.array(quantity, float), dims="case", attrs={"units": "N", "long_name": "made up"})
+
+
+def test_sensitivities_of_one_at_a_time_are_differences_from_the_base():
+    data, quantity = one_at_a_time({"a": [1.0, 2.0, 1.0], "b": [5.0, 5.0, 4.0]}, [10, 20, 0])
+    result = sensitivity(data, quantity)
+    found = {
+        str(name): tuple(float(result[key].sel(parameter=name)) for key in ("low", "high", "effect"))
+        for name in result["parameter"].values
+    }
+    assert found == {"a": (10.0, 20.0, 10.0), "b": (0.0, 10.0, 10.0)}
+    assert float(result["base"]) == 10.0
+    bars = tornado(result).axes[0].patches
+    assert sorted((bar.get_x(), bar.get_x() + bar.get_width()) for bar in bars) == [(0.0, 10.0), (10.0, 20.0)]
+
+
+def test_what_other_parameters_do_does_not_enter_a_one_at_a_time_sensitivity():
+    # q = 3 a + 100 b: three values of a on both sides of the base, one of b; texts count too
+    a = [0.0, -1.0, 1.0, 2.0, 0.0, 0.0]
+    b = [0.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+    kind = ["fixed"] * 5 + ["elastic"]
+    quantity = [3 * x + 100 * y - 7 * (k == "elastic") for x, y, k in zip(a, b, kind, strict=True)]
+    data, quantity = one_at_a_time({"a": a, "b": b, "kind": kind}, quantity)
+    result = sensitivity(data, quantity)
+    assert result["parameter"].values.tolist() == ["b", "a", "kind"]
+    assert result["low"].values.tolist() == [0.0, -3.0, -7.0] and result["high"].values.tolist() == [100.0, 6.0, 0.0]
+    assert float(result["rank_correlation"].sel(parameter="a")) == pytest.approx(1.0)
+    assert len(scatter(data, quantity).axes) == 3
+    with pytest.raises(ValueError, match="must have its base"):
+        sensitivity(data, quantity.where(quantity.case > 0))
+
+
+def test_effects_of_a_grid_are_those_of_a_linear_function_also_where_cases_are_missing():
+    a, b = (values.ravel() for values in np.meshgrid([1.0, 2.0, 3.0], [10.0, 20.0], indexing="ij"))
+    data = xr.Dataset(coords={"case": np.arange(6), "a": ("case", a), "b": ("case", b)})
+    result = sensitivity(data, xr.DataArray(5 * a + b, dims="case"))
+    # means over the grid: from a = 1 to 3, from b = 10 to 20
+    assert {str(n): float(result["effect"].sel(parameter=n)) for n in "ab"} == {"a": 10.0, "b": 10.0}
+    # the median of a parameter may be one of its values: both halves still hold different cases
+    thin = xr.Dataset(coords={"case": np.arange(3), "a": ("case", [1.0, 2.0, 2.0])})
+    assert float(sensitivity(thin, xr.DataArray([0.0, 8.0, 8.0], dims="case"))["effect"][0]) == 8.0
+
+
+def test_parameters_with_units_are_numbers_of_the_dataset(fast, tmp_path):
+    plan = TINY | {"parameters": {"gate.angle": ["1 rad", "60 deg"], "soils.0.k0": [0.5, 0.55]}}
+    data = coupling.study(plan, tmp_path, workers=0)
+    np.testing.assert_allclose(data["gate_angle"], np.degrees([1, 1, np.pi / 3, np.pi / 3]))
+    moment = data["bending_moment"].isel(progress=-1)
+    assert set(sensitivity(data, moment)["parameter"].values) == {"gate_angle", "soils_0_k0"}
+    ranges = {"gate.width": {"low": "15 cm", "high": "0.2 m"}, "ring.concrete_modulus": {"low": "20 GPa", "high": 3e10}}
+    sampled = load_study({"name": "s", "design": "sobol", "samples": 4, "parameters": ranges})
+    values = np.array([list(c.parameters.values()) for c in cases(sampled)])
+    assert 0.15 <= values[:, 0].min() and values[:, 0].max() <= 0.2
+    assert 2e10 <= values[:, 1].min() and values[:, 1].max() <= 3e10
+
+
+def test_what_a_one_at_a_time_study_repeats_is_no_case_more():
+    plan = {"name": "s", "design": "one-at-a-time", "parameters": {
+        "gate.width": [0.15, "200 mm", 0.2], "soils.0.k0": [0.577, 0.5], "water": ["none"]}}  # fmt: skip
+    found = cases(load_study(plan))
+    assert [case.name for case in found] == ["as it is", "width 0.15", "k0 0.5", "water none"]
+    assert [case.index for case in found] == [0, 1, 2, 3] and len({case.key for case in found}) == 4
+
+
+def test_lining_models_are_known_before_the_first_simulation(fast, tmp_path):
+    for backends, message in ((["beam-sprin"], "did you mean 'beam-spring'"), (["continuum"] * 2, "must differ"),
+                              ([f"{tmp_path / 'none.py'}:Mine"], "there is no file")):  # fmt: skip
+        with pytest.raises(StudyError, match=message):
+            coupling.study(TINY | {"backends": backends}, tmp_path / "out", workers=0)
+    assert not (tmp_path / "out").exists()
 
 
 def test_definition_travels_with_the_data(fast, tmp_path):

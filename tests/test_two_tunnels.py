@@ -1,12 +1,22 @@
 """Two tunnels side by side: both rings answer, each to its own pressures, and both are drawn."""
 
+import json
+import re
+import shutil
+
 import numpy as np
 import pytest
 from small_event import COARSE
+from test_cli import gush
 
 import coupling
 from coupling.datasets import read_pressures, read_response
-from coupling.run import respond_by_name
+from coupling.plausibility import warnings_of
+from coupling.report import run_page
+from coupling.report.page import write_report
+from coupling.run import respond, respond_by_name
+from coupling.scene import ring_of
+from coupling.summary import summarise_run
 
 GATE = 1
 
@@ -56,4 +66,68 @@ def test_initial_state_is_its_mirror_image(run):
 def test_both_tunnels_are_drawn_and_read_with_the_run(run):
     names = {path.stem for path in (run / "figures").glob("*.png")}
     assert {"internal_forces", "internal_forces_tunnel_0", "pressures", "pressures_tunnel_0"} <= names
+    assert {"fields", "fields_tunnel_0", "deformed_ring", "deformed_ring_tunnel_0"} <= names
     assert {"structure", "structure_tunnel_0"} <= set(coupling.read_run(run).children)
+
+
+def test_a_tunnel_of_another_diameter_has_a_ring_of_its_own(run):
+    tunnels = [tunnel.model_dump() for tunnel in coupling.load_scene("twin-tunnels").mpm.tunnels]
+    tunnels[0] |= {"outer_diameter": 5.0, "inner_diameter": 4.4, "cover": 15.0}
+    scene = coupling.load_scene("twin-tunnels", tunnels=tunnels, gate={"tunnel": GATE, "angle": 270.0})
+    small, own = ring_of(scene, 0), ring_of(scene, GATE)
+    assert own is scene.ring and (small.outer_diameter, small.inner_diameter) == (5.0, 4.4)
+    assert small.concrete_modulus == own.concrete_modulus and small.joint_angles == own.joint_angles
+    # buoyant weight down to the axis of each
+    assert small.ground.vertical_stress / own.ground.vertical_stress == pytest.approx(17.5 / 26.4)
+    assert any("tunnels[0] is not as wide as tunnel 1" in told for told in warnings_of(scene))
+    pressures = read_pressures(run)
+    answered = respond(scene, pressures, tunnel=0)
+    alone = respond_by_name(small, pressures.isel(tunnel=0, drop=True), "beam-spring")
+    np.testing.assert_array_equal(answered["bending_moment"], alone["bending_moment"])
+
+
+def test_commands_answer_for_all_tunnels(run, tmp_path):
+    copy = shutil.copytree(run, tmp_path / "run")
+    done = gush("respond", copy, "--backend", "continuum", "--json", "-")
+    assert done.exit_code == 0, done.output
+    data = json.loads(done.output)
+    for tunnel, told in ((None, data), (0, data["tunnels"]["0"])):
+        stored = read_response(copy, "continuum", tunnel)
+        assert told["bending_moment"]["final"]["max"] == float(stored["bending_moment"].isel(time=-1).max())
+    compared = gush("compare", copy, "--out", tmp_path / "out", "--json", tmp_path / "compared.json")
+    assert compared.exit_code == 0 and "tunnel 0" in compared.output, compared.output
+    assert json.loads((tmp_path / "compared.json").read_text())["tunnels"]["0"]["rows"]
+    assert (tmp_path / "out" / "tunnel-0" / "forces.png").is_file()
+    apart = gush("respond", copy, "--out", tmp_path / "answer.nc")
+    assert apart.exit_code == 0 and (tmp_path / "answer-tunnel-0.nc").is_file(), apart.output
+
+
+def test_table_and_report_show_all_tunnels(run):
+    summary, pressures = summarise_run(run), read_pressures(run)
+    crown = float(pressures["soil_pressure"].isel(time=-1, tunnel=0).sel(theta=0))
+    assert list(summary["tunnels"]) == [0]
+    assert summary["tunnels"][0]["soil_pressure"]["crown"]["final"] == crown
+    page = run_page.collect(run)
+    numbers = {number.key: number for group in page["numbers"].values() for number in group}
+    assert numbers["tunnel_0_soil_pressure_0"].final == crown
+    for key, tunnel in (("bending_moment_max", None), ("tunnel_0_bending_moment_max", 0)):
+        stored = read_response(run, tunnel=tunnel)["bending_moment"].isel(time=-1)
+        assert numbers[key].final == float(stored.max())
+    assert "Forces and deformation of the ring of tunnel 0, beam-spring" in page["numbers"]
+    assert list(page["player"]["models_beside"]) == [0]
+
+
+def test_player_of_the_report_shows_the_ring_of_the_tunnel_that_is_chosen(run, browser, tmp_path):
+    browser.complaints.clear()
+    browser.open(write_report(run, tmp_path / "report.html"))
+    moment = "document.getElementById('bending_moment').getAttribute('aria-label')"
+    choose = "(e => { e.value = '%d'; e.dispatchEvent(new Event('change')); })(document.getElementById('tunnel'))"
+    seen = {}
+    for tunnel in (GATE, 0, GATE):
+        browser.evaluate(choose % tunnel)
+        told = browser.evaluate(moment)
+        largest = float(read_response(run, tunnel=None if tunnel == GATE else tunnel)["bending_moment"][-1].max()) / 1e3
+        shown = float(re.search(r"max ([\d.]+) at", told)[1])
+        assert shown == pytest.approx(largest, rel=1e-2)
+        assert seen.setdefault(tunnel, told) == told
+    assert seen[0] != seen[GATE] and browser.complaints == []

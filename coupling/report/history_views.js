@@ -45,6 +45,7 @@ const readable = (units) => (units === "1" ? "" : units.replace(/ (\w+)-1/g, "/$
 
 function recordedCharts(onPick) {
   const place = document.getElementById("history"), made = [];
+  place.replaceChildren();
   for (const [name, series] of Object.entries(history.series)) {
     const figure = document.createElement("figure"), title = document.createElement("h3"), text = document.createElement("figcaption");
     const unit = readable(series.units), svg = element("svg", { id: `history-${name}`, role: "img" });

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coupling.datasets import HISTORY
-from coupling.report.series import match_times, model_names
+from coupling.datasets import HISTORY, structure_group
+from coupling.report.series import match_times, model_names, tunnels_beside
 from coupling.summary import PLACES
 
 #: Variable and which extreme of it: (label, unit shown, factor from SI).
@@ -56,11 +56,12 @@ def key_numbers(run):
     dict
         Title of a group to its list of Number; groups without numbers are left out.
     """
-    groups = {
-        "Gushing": _inflow_numbers(run),
-        "Pressures on the lining": _pressure_numbers(run["lining"].to_dataset()),
-        "Forces and deformation of the ring": _ring_numbers(run),
-    }
+    groups = {"Gushing": _inflow_numbers(run)}
+    for tunnel in (None, *tunnels_beside(run)):
+        of = "" if tunnel is None else f" of tunnel {tunnel}"
+        groups[f"Pressures on the lining{of}"] = _pressure_numbers(run["lining"].to_dataset(), tunnel)
+        title = ", ".join([f"Forces and deformation of the ring{of}", *model_names(run, tunnel)[:1]])
+        groups[title] = _ring_numbers(run, tunnel)
     return {title: numbers for title, numbers in groups.items() if numbers}
 
 
@@ -131,19 +132,19 @@ def scatter(values, spread):
     return float(np.hypot(np.std(np.diff(last)) / np.sqrt(2), spread))
 
 
-def _pressure_numbers(lining):
+def _pressure_numbers(lining, tunnel):
     if "soil_pressure" not in lining:
         return []
     if "tunnel" in lining.dims:
-        lining = lining.isel(tunnel=int(lining.attrs.get("gate_tunnel", 0)))
-    numbers = []
+        lining = lining.isel(tunnel=int(lining.attrs.get("gate_tunnel", 0)) if tunnel is None else tunnel)
+    numbers, key = [], "" if tunnel is None else f"tunnel_{tunnel}_"
     for name, label in (("soil_pressure", "soil"), ("water_pressure", "water")):
         for place, theta in PLACES.items():
             series, spread = lining[name].sel(theta=theta).values, lining[f"{name}_std"].sel(theta=theta).values
-            open_here = len(series) > 1 and _in_gap(lining.attrs, theta)
+            open_here = tunnel is None and len(series) > 1 and _in_gap(lining.attrs, theta)
             numbers.append(
                 Number(
-                    f"{name}_{theta}", f"{label}, {place}{' (the gap)' if open_here else ''}", "kPa", 1e-3,
+                    f"{key}{name}_{theta}", f"{label}, {place}{' (the gap)' if open_here else ''}", "kPa", 1e-3,
                     float(series[0]), None if open_here else float(series[-1]),
                     None if open_here else scatter(series, spread[-1]), "scatter of the last records",
                 )
@@ -199,11 +200,11 @@ def ring_extremes(response, record):
     return values
 
 
-def _ring_numbers(run):
-    models = model_names(run)
+def _ring_numbers(run, tunnel):
+    models = model_names(run, tunnel)
     if not models:
         return []
-    responses = {name: run[f"structure/{name}"].to_dataset() for name in models}
+    responses = {name: run[structure_group(name, tunnel)].to_dataset() for name in models}
     first = responses[models[0]]
     if not first.sizes["time"]:
         return []
@@ -215,7 +216,7 @@ def _ring_numbers(run):
             others.append(ring_extremes(responses[name], int(rows[0])))
     basis = f"difference from {', '.join(models[1:])}" if others else "none: one lining model, nothing to compare with"
     return [
-        Number(key, label, unit, scale, start[key], end[key],
+        Number(key if tunnel is None else f"tunnel_{tunnel}_{key}", label, unit, scale, start[key], end[key],
                max((abs(other[key] - end[key]) for other in others if key in other), default=None), basis)
         for key, (label, unit, scale) in RING_EXTREMES.items() if key in end
     ]  # fmt: skip
@@ -240,8 +241,10 @@ def quality(run, summary, scene=None):
     rows = [("mass of the grains, largest relative change", f"{summary['grain_mass_error']:.1e}",
              summary["grain_mass_error"] <= MASS_LIMIT)]  # fmt: skip
     rows += _against_theory(run["lining"].to_dataset(), scene)
-    for name in model_names(run):
-        response = run[f"structure/{name}"].to_dataset()
+    answers = [(model, k) for k in (None, *tunnels_beside(run)) for model in model_names(run, k)]
+    for model, tunnel in answers:
+        response = run[structure_group(model, tunnel)].to_dataset()
+        name = model if tunnel is None else f"{model}, tunnel {tunnel}"
         if not response.sizes["time"]:
             continue
         if "equilibrium_residual" in response:
@@ -291,6 +294,9 @@ def warnings(run, attributes, quality_rows):
     models = model_names(run)
     if "soil_pressure" in lining and not models:
         found.append("No lining model has answered to the pressures: run `gush respond` on this run.")
+    for tunnel in tunnels_beside(run) if models else ():
+        if not model_names(run, tunnel):
+            found.append(f"No lining model has answered for tunnel {tunnel}: run `gush respond` on this run.")
     for name in models:
         answered = run[f"structure/{name}"].sizes.get("time", 0)
         if answered != records:

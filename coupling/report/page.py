@@ -13,7 +13,7 @@ from coupling.run_folder import REPORT_FILE, RUN_FILE, RunRefused
 MARK = '<meta name="generator" content="gushing report">'
 
 
-def write_report(path, out=None):
+def write_report(path, out=None, model=None):
     """Write the page about a run or a study.
 
     Parameters
@@ -24,6 +24,8 @@ def write_report(path, out=None):
     out : str or path, optional
         The HTML file, or the folder for it; `report.html` in the folder of the run or study when left out. An earlier
         report is replaced, nothing else.
+    model : str, optional
+        Lining model whose numbers lead; left out: the run's own, or the first of the study.
 
     Returns
     -------
@@ -34,7 +36,7 @@ def write_report(path, out=None):
     RunFileError
         No run, or one without a record.
     RunRefused
-        Neither a run nor a study; `out` exists and is no report, or its folder does not exist.
+        Neither a run nor a study; `out` exists and is no report, or its folder does not exist; no such model.
     coupling.studies.design.StudyError
         A study whose definition cannot be read.
     """
@@ -43,12 +45,12 @@ def write_report(path, out=None):
         from coupling.report import run_markup, run_page
 
         target = _checked_path(run_file(path).parent, out)
-        data, parts, scripts = run_page.collect(path), run_markup.parts, run_page.SCRIPTS
+        data, parts, scripts = run_page.collect(path, model), run_markup.parts, run_page.SCRIPTS
     else:
         from coupling.report import study_markup, study_page
 
         target = _checked_path(folder, out)
-        data, parts, scripts = study_page.collect(folder, target.parent), study_markup.parts, study_page.SCRIPTS
+        data, parts, scripts = study_page.collect(folder, target.parent, model), study_markup.parts, study_page.SCRIPTS
     text = document(*parts(data), data["player"], _file("page.css"), "\n".join(map(_file, scripts)), MARK)
     with tempfile.NamedTemporaryFile("w", dir=target.parent, suffix=".html", delete=False, encoding="utf-8") as stream:
         stream.write(text)

@@ -1,6 +1,6 @@
 // What is drawn around the ring: pressures, internal forces, the deformed ring; the tables of joints and of models.
 const modelClass = (k) => `line model-${k % 4}`;
-let shape = "polar", tunnel = gate ? gate.tunnel : 0;
+let shape = "polar";
 
 class RingChart {
   // sources: () => [{name, rows}], one for each line "now"; compared: () => arrays that share the range of values
@@ -12,7 +12,7 @@ class RingChart {
   build() {
     const lines = this.sources(), svg = document.getElementById(this.key);
     const range = roundRange(rangeOf(this.compared(), this.factor), true);
-    const options = { x: this.angles, yRange: range, marks: gate ? [{ angle: gate.angle, text: "gap" }] : [],
+    const options = { x: this.angles, yRange: range, marks: gate && gate.tunnel === tunnel ? [{ angle: gate.angle, text: "gap" }] : [],
       classes: ["initial", ...lines.map((_, k) => modelClass(k))] };
     this.chart = shape === "polar" ? new PolarChart(svg, options) : new LineChart(svg, { ...options,
       xLabel: "angle from the crown, clockwise [°]", xTicks: [0, 60, 120, 180, 240, 300, 360], height: 250 });
@@ -49,6 +49,7 @@ function ringCharts() {
 class DeformedRing {
   constructor() {
     this.svg = document.getElementById("deformed");
+    this.svg.replaceChildren();
     const { outer_radius: outer, inner_radius: inner } = models[0];
     this.radius = (outer + inner) / 2;
     this.svg.setAttribute("viewBox", `${-1.4 * outer} ${-1.3 * outer} ${2.8 * outer} ${2.6 * outer}`);
@@ -170,7 +171,7 @@ const MODEL_ROWS = [
 function drawModelTable(frame) {
   const alone = models.length < 2;
   const body = tableWith(document.getElementById("model-table"),
-    `Now; below each value that of the start.${alone ? " This run holds one lining model; the answer of another one would stand beside it." : ""}`,
+    `Now; below each value that of the start.${alone && models.length ? " This run holds one lining model; the answer of another one would stand beside it." : ""}`,
     [["quantity", false], ...models.map((m) => [m.name, true]), ...models.slice(1).map((m) => [`${m.name} less ${models[0].name}`, true])]);
   for (const [name, key, group, reduce] of MODEL_ROWS) {
     if (!models.some((m) => m[group][key])) continue;

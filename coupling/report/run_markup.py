@@ -114,7 +114,7 @@ def _player(player):
         )
     tunnels = len(lining["tunnels"]) if lining else 0
     pick = "".join(f'<option value="{k}">{k}</option>' for k in range(tunnels))
-    tunnel = f'<label>Pressures of tunnel <select id="tunnel">{pick}</select></label>' if tunnels > 1 else ""
+    tunnel = f'<label>Pressures and ring of tunnel <select id="tunnel">{pick}</select></label>' if tunnels > 1 else ""
     return f"""<section id="player" aria-labelledby="player-title" tabindex="-1">
 <h2 id="player-title">Player over time</h2>
 <noscript><p class="warnings">The player needs JavaScript; numbers, balances and scene do not.</p></noscript>

@@ -1,11 +1,21 @@
 """What the page about a run shows, collected from its datasets."""
 
-from coupling.datasets import RunFileError, read_run, run_file
+import xarray as xr
+
+from coupling.datasets import RunFileError, read_run, run_file, structure_group
 from coupling.report.fields import field_snapshots, mesh_picture
 from coupling.report.numbers import key_numbers, quality, warnings
 from coupling.report.packing import packed
 from coupling.report.scene_facts import facts, left_out, read_scene, section
-from coupling.report.series import choose_frames, history_series, lining_series, model_names, model_series
+from coupling.report.series import (
+    choose_frames,
+    history_series,
+    lining_series,
+    model_names,
+    model_series,
+    tunnels_beside,
+)
+from coupling.run_folder import RunRefused
 from coupling.summary import summarise_run
 
 SCRIPTS = (
@@ -14,8 +24,14 @@ SCRIPTS = (
 )  # fmt: skip
 
 
-def collect(run):
+def collect(run, model=None):
     """Everything that the page shows.
+
+    Parameters
+    ----------
+    run : str or path
+    model : str, optional
+        Lining model whose numbers lead; left out: that of the run itself, see :func:`structure.models.in_order`.
 
     Returns
     -------
@@ -23,7 +39,7 @@ def collect(run):
         attributes, summary, numbers, quality, warnings, notes, facts, left_out: for the text; player: what the script
         draws, JSON.
     """
-    tree = read_run(run)
+    tree = _led_by(read_run(run), model)
     attributes = {name: _plain(value) for name, value in tree.attrs.items()}
     if "history" not in tree.children or "lining" not in tree.children:
         raise RunFileError(f"run file '{run_file(run)}': it holds no run; give the folder that `gush run` wrote")
@@ -46,6 +62,20 @@ def collect(run):
     }
 
 
+def _led_by(tree, model):
+    """The tree with the responses of a model before those of the others; as it is for None."""
+    if model is None:
+        return tree
+    if model not in model_names(tree):
+        raise RunRefused(
+            f"--model: must be a lining model that has answered, got {model!r}; there are "
+            f"{', '.join(model_names(tree)) or 'none'}: run gush respond first"
+        )
+    groups = tree.to_dict()
+    first = {path: groups[path] for path in groups if path.rpartition("/")[2] == model or path == "/"}
+    return xr.DataTree.from_dict(first | groups)
+
+
 def _player(tree, scene, frames, fields):
     lining = tree["lining"].to_dataset()
     times = lining["time"].values[frames]
@@ -54,11 +84,19 @@ def _player(tree, scene, frames, fields):
         "inflow_mass": packed(lining["inflow_mass"].values[frames]),
         "section": section(scene, lining.attrs),
         "lining": lining_series(tree, frames),
-        "models": [model_series(name, tree[f"structure/{name}"].to_dataset(), times) for name in model_names(tree)],
+        "models": _models(tree, None, times),
+        "models_beside": {k: _models(tree, k, times) for k in tunnels_beside(tree)},
         "history": history_series(tree),
         "mesh": mesh_picture(tree["mesh"].to_dataset()) if "mesh" in tree.children else None,
         "fields": fields,
     }
+
+
+def _models(tree, tunnel, times):
+    return [
+        model_series(name, tree[structure_group(name, tunnel)].to_dataset(), times)
+        for name in model_names(tree, tunnel)
+    ]
 
 
 def _thinned(tree, frames, fields, scene):

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 
-from coupling.datasets import RunFileError
+from coupling.datasets import RunFileError, structure_group
 from coupling.report.packing import BASE64, evenly, packed
 
 PRESSURES = ("soil_pressure", "water_pressure", "soil_shear")
@@ -24,14 +24,23 @@ def choose_frames(run):
     run : xarray.DataTree;  returns (n,) int64.
     """
     lining = run["lining"].to_dataset()
-    fields = len(PRESSURES) * lining.sizes.get("tunnel", 1) + len(RING_FIELDS) * len(model_names(run))
+    fields = len(PRESSURES) * lining.sizes.get("tunnel", 1)
+    fields += len(RING_FIELDS) * sum(len(model_names(run, tunnel)) for tunnel in (None, *tunnels_beside(run)))
     bytes_each = 4 * BASE64 * fields * 360
     return evenly(lining.sizes["time"], min(MOST_FRAMES, int(BYTES_OF_FRAMES / bytes_each)))
 
 
-def model_names(run):
-    """Lining models that a run holds, in the order they were stored."""
-    return list(run["structure"].children) if "structure" in run.children else []
+def model_names(run, tunnel=None):
+    """Lining models that have answered for a tunnel, None: that with the gate; the leading one first."""
+    home = structure_group("", tunnel).rstrip("/")
+    return list(run[home].children) if home in run.children else []
+
+
+def tunnels_beside(run):
+    """Numbers of the tunnels without the gate."""
+    lining = run["lining"].to_dataset()
+    gate = int(lining.attrs.get("gate_tunnel", 0))
+    return [k for k in range(lining.sizes.get("tunnel", 1)) if k != gate]
 
 
 def lining_series(run, frames):

@@ -12,9 +12,9 @@ function gapMarks(shownCases) {
   });
 }
 
-// Numbers of the cases beside their lines, where they are few; many are told by the check boxes.
-const numbersOf = (shownCases) => (shownCases.length > COLOURS.length ? []
-  : legend(shownCases.map((one) => [String(one.number), "line", one.style])));
+// Names of the cases beside their lines, where they are few; many are told by the check boxes.
+const namesOf = (shownCases) => (shownCases.length > COLOURS.length ? []
+  : legend(shownCases.map((one) => [one.label, "line", one.style])));
 
 class RingComparison {
   constructor(key) {
@@ -42,11 +42,11 @@ class RingComparison {
     this.cases.forEach((one, k) => {
       const at = recordAt(one, frame), none = new Float32Array(this.angles.length).fill(NaN);
       this.chart.set(k, at ? this.row(one, at.curve) : none, this.factor);
-      told.push(`case ${one.number} ${at ? this.extremes(one, at.record) : "did not get there"}`);
+      told.push(`case ${one.label}: ${at ? this.extremes(one, at.record) : "did not get there"}`);
     });
     const what = `${this.key.replace(/_/g, " ")} in ${this.unit}${against === "change" ? ", change" : ""}`;
     document.getElementById(this.key).setAttribute("aria-label", `${what}: ${told.join("; ") || "no case is shown"}`);
-    caption(this.key, ...numbersOf(this.cases), sentence(this.summary(frame)));
+    caption(this.key, ...namesOf(this.cases), sentence(this.summary(frame)));
   }
   // exact also where the curves are thinned
   extremes(one, record) {
@@ -63,10 +63,10 @@ class RingComparison {
       if (!at) continue;
       const value = from(one)[`${this.key}_max`].values[at.record] * this.factor;
       if (Number.isFinite(value) && (!best || value > best.value)) {
-        best = { value, number: one.number, angle: from(one)[`${this.key}_max_angle`].values[at.record] };
+        best = { value, label: one.label, angle: from(one)[`${this.key}_max_angle`].values[at.record] };
       }
     }
-    return best ? `largest ${shown(best.value)} at ${shown(best.angle)}°, case ${best.number}` : "no case is shown";
+    return best ? `largest ${shown(best.value)} at ${shown(best.angle)}°, case ${best.label}` : "no case is shown";
   }
 }
 
@@ -93,10 +93,10 @@ class CaseLines {
       const at = recordAt(line.one, frame);
       this.chart.dot(k, at ? line.x[at.record] : NaN, at ? line.y[at.record] : NaN, this.factor);
       const value = at ? shown(line.y[at.record] * this.factor) : "–";
-      told.set(line.one.number, [...(told.get(line.one.number) || []), value]);
+      told.set(line.one.label, [...(told.get(line.one.label) || []), value]);
     });
-    const text = [...told].map(([number, values]) => `case ${number} ${values.join(" and ")}`).join("; ");
-    caption(this.key, ...numbersOf(this.cases));
+    const text = [...told].map(([label, values]) => `case ${label}: ${values.join(" and ")}`).join("; ");
+    caption(this.key, ...namesOf(this.cases));
     document.getElementById(this.key).setAttribute("aria-label",
       `${this.key.replace(/_/g, " ")} in ${this.unit}, now ${text || "no case is shown"}`);
   }

@@ -5,7 +5,7 @@ from html import escape
 from coupling.quality import LABELS
 from coupling.report.frame import duration, figure, header, provenance, rows_of_facts, scroll, shown
 from coupling.report.run_markup import RING_CHARTS
-from coupling.report.study_page import short_names, value_text
+from coupling.studies.design import short_names, value_text
 
 #: Of the run's key numbers those that stand in the table of cases, with their short headings.
 COLUMNS = {
@@ -43,7 +43,7 @@ def parts(data):
     cases = data["cases"]
     title = f"Gushing into a tunnel: study {data['name']}"
     done = sum(case["status"] == "finished" for case in cases)
-    warned = [f"Case {c['number']} ({c['label']}): {text}" for c in cases for text in c["warnings"]]
+    warned = [f"Case {c['label']}: {text}" for c in cases for text in c["warnings"]]
     if len(warned) > 6:
         warned = [*warned[:5], f"{len(warned) - 5} more are named in the table of balances and warnings."]
     lost = [case for case in cases if case["status"] != "finished"]
@@ -77,13 +77,13 @@ def _design(data, lost):
     failed = ""
     if lost:
         rows = "".join(
-            f'<tr data-lost="{case["number"]}"><th scope="row">{case["number"]}</th><td>{escape(case["label"])}</td>'
+            f'<tr data-lost="{case["number"]}"><th scope="row">{escape(case["label"])}</th>'
             f'<td>{escape(case["status"])}</td><td class="reason">{escape(case["message"])}</td>'
             f"<td>{_links(case)}</td></tr>"
             for case in lost
         )
         table = (
-            '<table><thead><tr><th scope="col">case</th><th scope="col">parameters</th><th scope="col">status</th>'
+            '<table><thead><tr><th scope="col">case</th><th scope="col">status</th>'
             f'<th scope="col">reason</th><th scope="col">files</th></tr></thead><tbody>{rows}</tbody></table>'
         )
         failed = f'<h3 id="lost">Cases without a result</h3>{scroll("lost", table)}'
@@ -141,7 +141,7 @@ def _result_row(case, parameters, columns):
         cells.append(_cell(number.final * number.scale, small=error, key=key))
     cells += [_cell(case["cpu_seconds"]), _cell(case["wall_seconds"]), _cell(len(case["warnings"]))]
     return (
-        f'<tr data-case="{case["number"]}"><th scope="row" data-value="{case["number"]}">{case["number"]}</th>'
+        f'<tr data-case="{case["number"]}"><th scope="row" data-value="{case["number"]}">{escape(case["label"])}</th>'
         f"{''.join(cells)}<td>{_links(case)}</td></tr>"
     )
 
@@ -231,8 +231,8 @@ def _trust(cases):
         cells = "".join(_cell(case["balances"].get(name), form=LABELS[name][1].format) for name in names)
         told = "".join(f"<li>{escape(text)}</li>" for text in case["warnings"])
         rows += (
-            f'<tr data-trust="{case["number"]}"><th scope="row" data-value="{case["number"]}">{case["number"]}</th>'
-            f"{cells}<td>{f'<ul>{told}</ul>' if told else 'none'}</td></tr>"
+            f'<tr data-trust="{case["number"]}"><th scope="row" data-value="{case["number"]}">'
+            f"{escape(case['label'])}</th>{cells}<td>{f'<ul>{told}</ul>' if told else 'none'}</td></tr>"
         )
     table = f"<thead><tr>{heads}</tr></thead><tbody>{rows}</tbody>"
     return f"""<section aria-labelledby="trust">

@@ -15,11 +15,12 @@ from coupling.report.study_series import (
     ring_extremes_over_mass,
     slider_stops,
 )
-from coupling.run_folder import LOG_FILE, REPORT_FILE
+from coupling.run_folder import LOG_FILE, REPORT_FILE, RunRefused
 from coupling.studies.case import RUN_FOLDER
 from coupling.studies.collect import stored_cases, unreadable
-from coupling.studies.design import Range, StudyError
+from coupling.studies.design import Range, StudyError, value_text
 from coupling.studies.execute import case_file
+from structure.models import model_name
 
 SCRIPTS = (
     "unpack.js", "charts.js", "tables.js", "slider.js", "study_data.js", "study_charts.js", "study_tables.js",
@@ -28,7 +29,7 @@ SCRIPTS = (
 MOST_VALUES_NAMED = 6  # of a fact that differs between the cases
 
 
-def collect(folder, beside):
+def collect(folder, beside, model=None):
     """Everything that the page shows.
 
     Parameters
@@ -37,6 +38,8 @@ def collect(folder, beside):
         Of the study.
     beside : path
         Folder of the page: links are relative to it.
+    model : str, optional
+        Lining model whose numbers lead; left out: the study's first.
 
     Returns
     -------
@@ -52,11 +55,18 @@ def collect(folder, beside):
     """
     plan, found, failures = stored_cases(folder)
     done = [case for case in found if case_file(Path(folder), case).is_file()]
+    models = [model_name(backend) for backend in plan.backends]
+    if model is not None:
+        if model not in models:
+            raise RunRefused(
+                f"--model: must be one of the study, got {model!r}; there are {', '.join(models) or 'none'}"
+            )
+        models.insert(0, models.pop(models.index(model)))
     rows, whole, extremes = [], {}, {}
     for case in found:
         one, file = None, case_file(Path(folder), case)
         if case in done:
-            one = whole[case.index] = _loaded(file, plan.backends)
+            one = whole[case.index] = _loaded(file, models)
             extremes[case.index] = ring_extremes_over_mass(one)
         rows.append(_row(case, one, extremes.get(case.index), failures.get(case.key), file.parent, Path(beside)))
     drawn = [case for case in done if last_record(whole[case.index]) is not None]
@@ -103,7 +113,7 @@ def _player(dataset, whole, extremes, chosen, rows, step, records):
 
 
 def _loaded(file, models):
-    """The dataset of a case, in memory, with all lining models of the study in their order."""
+    """The dataset of a case, in memory, with these lining models in their order."""
     try:
         dataset = read_group_at_once(file)
         same = "model" not in dataset.dims or tuple(dataset["model"].values) == tuple(models)
@@ -123,7 +133,7 @@ def _row(case, dataset, extremes, failure, folder, beside):
         status, message = "failed", failure or "no reason was given"
     return {
         "number": case.index,
-        "label": label(case.parameters),
+        "label": case.name,
         "parameters": case.parameters,
         "status": status,
         "message": message,
@@ -136,23 +146,6 @@ def _row(case, dataset, extremes, failure, folder, beside):
         "report": _relative(run / REPORT_FILE, beside) if (run / REPORT_FILE).is_file() else None,
         "log": _relative(run / LOG_FILE, beside) if (run / LOG_FILE).is_file() else None,
     }
-
-
-def label(parameters):
-    """The parameters of a case in a few words."""
-    names = short_names(parameters)
-    return ", ".join(f"{name} {value_text(value)}" for name, value in zip(names, parameters.values(), strict=True))
-
-
-def short_names(parameters):
-    """Names of parameters without their table, where they stay different."""
-    short = [name.rpartition(".")[2] for name in parameters]
-    return short if len(set(short)) == len(short) else list(parameters)
-
-
-def value_text(value):
-    """A parameter's value as text."""
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _relative(path, beside):

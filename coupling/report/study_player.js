@@ -13,7 +13,7 @@ function caseBoxes(redraw) {
     box.checked = one.shown = first.has(k);
     box.addEventListener("change", () => { one.shown = box.checked; redraw(); });
     label.className = "case";
-    label.append(box, ...legend([[`${one.number}: ${one.label}`, "line", one.style]]));
+    label.append(box, ...legend([[one.label, "line", one.style]]));
     place.append(label);
     boxes.push(box);
   });

@@ -48,7 +48,7 @@ class NowTable {
     this.table = document.getElementById("now-table");
     this.columns = NOW_COLUMNS.filter(([key]) => cases.some((one) => Number.isFinite(NOW_COLUMNS.find((c) => c[0] === key)[4](one, 0))));
     this.body = tableWith(this.table, "",
-      [["case", false], ["parameters", false], ["inflow mass [kg/m]", true], ...this.columns.map(([, name, unit]) => [`${name} [${unit}]`, true])]);
+      [["case", false], ["inflow mass [kg/m]", true], ...this.columns.map(([, name, unit]) => [`${name} [${unit}]`, true])]);
     for (const heading of this.table.tHead.rows[0].cells) {
       const button = document.createElement("button");
       button.type = "button";
@@ -56,7 +56,7 @@ class NowTable {
       button.append(...heading.childNodes);
       heading.append(button);
       heading.setAttribute("aria-sort", "none");
-      if (heading.cellIndex === 1) heading.classList.add("text");
+      if (heading.cellIndex === 0) heading.classList.add("text");
     }
   }
   draw(frame) {
@@ -64,8 +64,7 @@ class NowTable {
     for (const one of visible()) {
       const at = recordAt(one, frame), row = this.body.insertRow();
       row.dataset.now = one.number;
-      cell(row, String(one.number), { head: "row" }).dataset.value = one.number;
-      cell(row, one.label).className = "text";
+      cell(row, one.label, { head: "row" }).dataset.value = one.number;
       const filled = (text, value, small = null) => { cell(row, text, { number: true, small }).dataset.value = Number.isFinite(value) ? value : ""; };
       filled(at ? shown(one.mass[at.record]) : "not reached", at ? one.mass[at.record] : NaN);
       for (const [key, , , factor, value] of this.columns) {

@@ -14,7 +14,7 @@ RUN_FOLDER = "run"
 PROGRESS = ("time", "flow_zone_area", "disturbed_area", "suspended_fraction", "max_velocity")
 
 
-def run_case(source: str, folder: str, backends: tuple[str, ...], records: int) -> str:
+def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, threads: int = 1) -> str:
     """Run one scene and write its `case.nc`; at once where that exists.
 
     Parameters
@@ -27,6 +27,8 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int) 
         Lining models.
     records : int
         Number of inflow masses.
+    threads : int
+        Results do not depend on it.
 
     Returns
     -------
@@ -41,33 +43,37 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int) 
 
     from coupling.datasets import read_history, read_pressures, write_response
     from coupling.provenance import root_attributes
-    from coupling.run import respond, respond_beside, run
+    from coupling.run import gate_tunnel, respond, respond_beside, run
     from coupling.run_folder import RUN_FILE, RunRefused
     from coupling.scene import parse_scene
     from coupling.studies.progress import CaseProgress
+    from structure.models import lining_model, model_name
 
     place = Path(folder)
     done = place / CASE_FILE
     if done.is_file():
         return str(done)
     scene = parse_scene(source, str(place))
+    models = {model_name(backend): backend for backend in backends} if scene.ring is not None else {}
+    for backend in models.values():
+        lining_model(backend)(scene.ring)  # what it refuses is refused before the simulation
     place.mkdir(parents=True, exist_ok=True)
     run_folder = place / RUN_FOLDER
     report = CaseProgress(place)
     try:
-        run(scene, run_folder, threads=1, resume=True, progress=report)
+        run(scene, run_folder, threads=threads, resume=True, progress=report)
     except RunRefused:
         # nothing there yet, or what is there began with other versions or has failed
-        run(scene, run_folder, overwrite=True, threads=1, progress=report)
+        run(scene, run_folder, overwrite=True, threads=threads, progress=report)
     report({"stage": "respond"})
     pressures, history = read_pressures(run_folder), read_history(run_folder)
     if "tunnel" in pressures.dims:
-        pressures = pressures.isel(tunnel=scene.mpm.gate.tunnel if scene.mpm.gate else 0, drop=True)
+        pressures = pressures.isel(tunnel=gate_tunnel(scene), drop=True)
     responses = {}
-    for name in backends if scene.ring is not None else ():
-        responses[name] = respond(scene, pressures, name)
+    for name, backend in models.items():
+        responses[name] = respond(scene, pressures, backend)
         write_response(run_folder / RUN_FILE, responses[name], name)
-        respond_beside(scene, run_folder, name)
+        respond_beside(scene, run_folder, backend)
     last = scene.mpm.stop.inflow_mass or float(history["inflow_mass"].values[-1])
     result = at_inflow_masses(pressures, history, responses, np.linspace(0.0, last, records))
     result.attrs = root_attributes(scene)

@@ -8,18 +8,23 @@ from pathlib import Path
 
 import numpy as np
 
+from coupling.netcdf_group import read_group_at_once
 from coupling.provenance import origin, with_history
 from coupling.studies.design import Case, Study, StudyError
 
+#: Studies whose cases take less than this on the disk are held in memory.
+MOST_BYTES_IN_MEMORY = 5e8
+
 
 def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, str]):
-    """The cases' datasets along a dimension `case`, loaded when used.
+    """The cases' datasets along a dimension `case`; a large study is loaded when used.
 
     Returns
     -------
     xarray.Dataset
         Variables of :func:`coupling.studies.case.at_inflow_masses` with `case` in front; parameters as coordinates
-        (case) under their dotted names with `_` for `.`; `status` (case) "finished" or "failed", `message` (case);
+        (case) in SI under their dotted names with `_` for `.`, and `case_name`; `status` (case) "finished" or
+        "failed", `message` (case);
         failed cases are NaN. Attributes: `study`, its definition as JSON with the seed; `failed`, their number; source,
         revision, versions.
 
@@ -33,12 +38,15 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     from coupling.studies.execute import case_file
 
     there = [case for case in cases if case_file(folder, case).is_file()]
-    parts = []
-    for case in there:
-        file = case_file(folder, case)
+    parts, files = [], [case_file(folder, case) for case in there]
+    small = sum(file.stat().st_size for file in files) < MOST_BYTES_IN_MEMORY
+    for file in files:
         try:
-            parts.append(xr.open_dataset(file, engine="h5netcdf", chunks={}, decode_timedelta=False))
-        except (OSError, RuntimeError, ValueError, KeyError) as error:
+            if small:
+                parts.append(read_group_at_once(file))
+            else:
+                parts.append(xr.open_dataset(file, engine="h5netcdf", chunks={}, decode_timedelta=False))
+        except (OSError, RuntimeError, ValueError, KeyError, AttributeError) as error:
             raise StudyError(unreadable(file, error)) from None
     if parts:
         result = xr.concat(
@@ -49,8 +57,10 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     else:
         result = xr.Dataset(coords={"case": [case.index for case in cases]})
     result["case"].attrs = {"units": "1", "long_name": "number of the case"}
+    names = np.array([case.name for case in cases], dtype=str)
+    result = result.assign_coords(case_name=("case", names, {"long_name": "what the case changes"}))
     for name in plan.parameters:
-        values = np.array([case.parameters[name] for case in cases])
+        values = _column([case.parameters[name] for case in cases])
         result = result.assign_coords({name.replace(".", "_"): ("case", values, {"long_name": name})})
     if "scene" in plan.parameters:
         result = result.assign_coords(_of_scenes(cases))
@@ -66,6 +76,16 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
         "failed": int((~done).sum()),
     }
     return result
+
+
+def _column(values):
+    """Values of a parameter as an array of numbers, of truth values, or of texts."""
+    there = [value for value in values if value is not None]
+    if there and all(isinstance(value, int | float) and not isinstance(value, bool) for value in there):
+        return np.array([np.nan if value is None else value for value in values])
+    if all(isinstance(value, bool) for value in values):
+        return np.array(values)
+    return np.array(["none" if value is None else str(value) for value in values])
 
 
 def unreadable(file: Path, error: Exception) -> str:

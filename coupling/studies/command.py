@@ -7,6 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from structure.models import model_name
+
+#: Keys of a case's result.
+RESULTS = ("cpu_seconds", "inflow_mass", "time", "axial_force", "bending_moment")
+
 
 def run_study(name, out, workers, scheduler, console):
     """Run a study, store its dataset as study.nc, and return what the command shows.
@@ -14,8 +19,9 @@ def run_study(name, out, workers, scheduler, console):
     Returns
     -------
     dict
-        study, folder, data: path of the dataset; cases: list of dicts with case, parameters, status, message,
-        cpu_seconds [s], time [s] of the last inflow mass reached.
+        study, folder, data: path of the dataset; model: the first lining model; cases: list of dicts with case, name,
+        parameters, status, message, cpu_seconds [s], and at the last inflow mass reached: inflow_mass [kg/m], time [s],
+        axial_force [N/m] and bending_moment [N m/m] of that model as {max, min}, None without a ring.
     """
     from coupling.studies.design import cases, load_study
     from coupling.studies.execute import DATA_FILE, study
@@ -31,15 +37,30 @@ def run_study(name, out, workers, scheduler, console):
     rows = []
     for case in cases(plan):
         one = dataset.sel(case=case.index)
-        finished = str(one["status"].values) == "finished"
+        status = str(one["status"].values)
         rows.append(
             {
                 "case": case.index,
+                "name": case.name,
                 "parameters": case.parameters,
-                "status": str(one["status"].values),
+                "status": status,
                 "message": str(one["message"].values),
-                "cpu_seconds": float(one["cpu_seconds"]) if finished else None,
-                "time": float(np.nanmax(one["time"].values)) if finished else None,
+                **(_result(one, plan.backends) if status == "finished" else dict.fromkeys(RESULTS)),
             }
         )
-    return {"study": plan.name, "folder": str(folder), "data": str(folder / DATA_FILE), "cases": rows}
+    model = model_name(plan.backends[0]) if plan.backends else None
+    return {"study": plan.name, "folder": str(folder), "data": str(folder / DATA_FILE), "model": model, "cases": rows}
+
+
+def _result(one, backends):
+    """What a finished case came to, at the last inflow mass that it reached."""
+    reached = np.flatnonzero(np.isfinite(one["time"].values))
+    last = one.isel(progress=reached[-1] if len(reached) else 0)
+    found = {name: float(last[name]) for name in ("cpu_seconds", "inflow_mass", "time")}
+    for name in ("axial_force", "bending_moment"):
+        found[name] = None
+        if name in last:
+            values = last[name].sel(model=model_name(backends[0])) if "model" in last.dims else last[name]
+            if np.isfinite(values).any():
+                found[name] = {"max": float(values.max()), "min": float(values.min())}
+    return found

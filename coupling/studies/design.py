@@ -14,13 +14,25 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from coupling.scene import Scene, SceneError, make_scene, parse_toml, read_scene_data, read_toml_file
+from coupling.scene import (
+    Scene,
+    SceneError,
+    changed,
+    make_scene,
+    nested,
+    number_in_unit,
+    parse_toml,
+    read_scene_data,
+    read_toml_file,
+)
 from coupling.scene_lines import line_of
 
 #: Changes when stored cases can no longer be used.
-FORMAT = "1"
+FORMAT = "2"
+#: What stands for a whole table that a case leaves as the scene has it, and for a case that changes nothing.
+AS_IT_IS = "as it is"
 
 
 class StudyError(SceneError):
@@ -65,7 +77,7 @@ class Study(BaseModel):
         (scipy.stats.qmc).
     parameters : dict
         Dotted name of a scene's key, as "gate.angle" or "soils.0.porosity", to a list of values (factorial, list) or to
-        a table with low, high and scale (samples).
+        a table with low, high and scale (samples). Strings with units are taken as in a scene.
     fixed : dict
         Dotted names to values that all cases take instead of the scene's.
     samples : int, optional
@@ -89,6 +101,24 @@ class Study(BaseModel):
     seed: int = 0
     backends: tuple[str, ...] = ("beam-spring",)
     records: int = Field(default=41, ge=2, le=10_000)
+
+    @field_validator("parameters", mode="before")
+    @classmethod
+    def _read_parameters(cls, parameters):
+        """Arrays as lists, ends of ranges in SI; a single value is refused with its remedy."""
+        if not isinstance(parameters, dict):
+            return parameters
+        read = {}
+        for name, values in parameters.items():
+            values = values.tolist() if hasattr(values, "tolist") else values
+            if isinstance(values, dict):
+                values = {key: _in_unit(name, value) if key in ("low", "high") else value
+                          for key, value in values.items()}  # fmt: skip
+            elif not isinstance(values, list | tuple | Range):
+                raise ValueError(f"{name}: must be a list of values or a range, got {values!r}; write [{values!r}], or "
+                                 "give it under fixed")  # fmt: skip
+            read[name] = values
+        return read
 
     @model_validator(mode="after")
     def _check(self):
@@ -141,7 +171,8 @@ class Study(BaseModel):
 class Case:
     """One scene of a study: its parameters, and a key that is the same whenever the same would be computed.
 
-    parameters : every parameter of the study;  changes : those that the design sets in this case.
+    parameters : every parameter of the study, as the scene takes it (SI);  changes : those that the design sets in this
+    case.
     """
 
     index: int
@@ -149,6 +180,25 @@ class Case:
     changes: dict[str, Any]
     scene: Scene
     key: str
+
+    @property
+    def name(self) -> str:
+        """What the case changes, in a few words."""
+        names = short_names(self.changes)
+        return ", ".join(f"{n} {value_text(v)}" for n, v in zip(names, self.changes.values(), strict=True)) or AS_IT_IS
+
+
+def short_names(parameters) -> list[str]:
+    """Names of parameters without their table, where they stay different."""
+    short = [name.rpartition(".")[2] for name in parameters]
+    return short if len(set(short)) == len(short) else list(parameters)
+
+
+def value_text(value: Any) -> str:
+    """A parameter's value as text."""
+    if value is None:
+        return "none"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def load_study(study: str | Path | dict | Study) -> Study:
@@ -202,53 +252,63 @@ def cases(study: Study) -> list[Case]:
     StudyError
         A parameter that the scene does not have, or values that it refuses; the case is named.
     """
-    result = []
-    for index, parameters in enumerate(study.combinations()):
-        changes = dict(parameters)
-        base = changes.pop("scene", study.scene)
+    found: dict[str, Case] = {}
+    for number, changes in enumerate(study.combinations()):
+        base = changes.get("scene", study.scene)
         try:
             data = read_scene_data(base)
             for name, value in {**study.fixed, **changes}.items():
-                data = _changed(data, name.split("."), value, name)
-            scene = make_scene(data, f"case {index}")
+                if name != "scene":
+                    data = changed(data, nested(name, value))
+            scene = make_scene(data, f"case {number}")
         except SceneError as problem:
-            shown = ", ".join(f"{name} = {value}" for name, value in parameters.items())
-            raise StudyError(f"study '{study.name}', case {index} ({shown}): {problem}") from None
-        known = {name: parameters.get(name, base if name == "scene" else None) for name in study.parameters}
-        if study.design == "one-at-a-time":
-            known = {
-                name: _value_in(scene, name) if name != "scene" and name not in parameters else value
-                for name, value in known.items()
-            }
-        result.append(Case(index, known, parameters, scene, _key(scene, study)))
-    return result
+            shown = ", ".join(f"{name} = {value}" for name, value in changes.items())
+            raise StudyError(f"study '{study.name}', case {number} ({shown}): {problem}") from None
+        values = {name: base if name == "scene" else _value_in(scene, name) for name in study.parameters}
+        known = {name: changes.get(name, AS_IT_IS) if isinstance(v, dict) else v for name, v in values.items()}
+        key = _key(scene, study)
+        # what a scene is already is no case more
+        found.setdefault(key, Case(len(found), known, {name: known[name] for name in changes}, scene, key))
+    return list(found.values())
+
+
+def _in_unit(name, value):
+    try:
+        return number_in_unit(name, value)
+    except ValueError as problem:
+        raise ValueError(f"{name}: {problem}") from None
+
+
+def check_backends(study: Study):
+    """Refuse lining models that are not there before anything runs; a study that ran is read without them.
+
+    Raises
+    ------
+    StudyError
+        An unknown model, or the same one twice.
+    """
+    from structure.models import lining_model, lining_model_names, model_name
+
+    try:
+        for backend in study.backends:
+            if backend not in lining_model_names():
+                lining_model(backend)  # says why not, or finds the class in a file
+    except ValueError as problem:
+        raise StudyError(f"study '{study.name}': backends: {problem}") from None
+    names = [model_name(backend) for backend in study.backends]
+    if len(set(names)) < len(names):
+        raise StudyError(f"study '{study.name}': backends: must differ, got {', '.join(names)}; name each once")
 
 
 def _value_in(scene, name):
-    """Value of a complete scene at a dotted name."""
+    """Value of a complete scene at a dotted name; None where it has none."""
     value = scene.mpm.model_dump() | {"ring": None if scene.ring is None else scene.ring.model_dump()}
     for part in name.split("."):
-        value = value[int(part)] if isinstance(value, list | tuple) else value[part]
+        try:
+            value = value[int(part)] if isinstance(value, list | tuple) else value[part]
+        except (KeyError, TypeError, ValueError, IndexError):
+            return None
     return value
-
-
-def _changed(data, path, value, name):
-    """A copy of nested dictionaries and lists with one value replaced."""
-    first, *rest = path
-    if isinstance(data, list | tuple):
-        if not first.isdigit() or int(first) >= len(data):
-            raise StudyError(
-                f"parameters.{name}: '{first}' must be a number below {len(data)}, the length of that list; as in"
-                " soils.0.porosity"
-            )
-        copy = list(data)
-        copy[int(first)] = _changed(copy[int(first)], rest, value, name) if rest else value
-        return copy
-    if not isinstance(data, dict):
-        raise StudyError(f"parameters.{name}: '{first}' must lie in a table or list, got {data!r}; shorten the name")
-    copy = dict(data)
-    copy[first] = _changed(copy.get(first, {}), rest, value, name) if rest else value
-    return copy
 
 
 @cache
@@ -263,8 +323,15 @@ def _code() -> str:
 
 
 def _key(scene: Scene, study: Study) -> str:
-    text = "\n".join([_code(), scene.source, ",".join(study.backends), str(study.records)])
+    models = [_source_of(backend) for backend in study.backends]
+    text = "\n".join([_code(), scene.source, ",".join(models), str(study.records)])
     return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _source_of(backend):
+    """What decides the answers of a lining model besides the sources of this program."""
+    file = Path(backend.rpartition(":")[0])
+    return backend + file.read_text(encoding="utf-8") if ".py:" in backend and file.is_file() else backend
 
 
 def _read(name: str) -> str:

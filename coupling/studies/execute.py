@@ -1,4 +1,4 @@
-"""Running the cases of a study: in this process, on a local cluster, or on a scheduler that is there already."""
+"""Running the cases of a study: in this process, in several of this machine, or on a scheduler that is there."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from coupling.studies.case import CASE_FILE, run_case
-from coupling.studies.design import Case, Study, StudyError, cases, load_study
+from coupling.studies.design import Case, Study, StudyError, cases, check_backends, load_study
 from coupling.studies.progress import StudyState, watching
 
 #: Times that a case may lose its worker, the last ones with nothing beside it.
@@ -40,7 +40,7 @@ def study(
     out : str or path, optional
         Folder; studies/NAME when left out. Studies may share one: equal cases are then shared.
     workers : int, optional
-        Processes of the local cluster, one thread each; number of cores when left out; 0 runs in this process.
+        Processes on this machine, which share its cores; number of cores when left out; 0 runs in this process.
     scheduler : str, optional
         Address of a dask scheduler to use instead; its workers must see `out` under the same path.
     progress : callable, optional
@@ -51,7 +51,7 @@ def study(
     Returns
     -------
     xarray.Dataset
-        See :func:`coupling.studies.collect.collect`; loaded lazily.
+        See :func:`coupling.studies.collect.collect`.
 
     Raises
     ------
@@ -61,6 +61,7 @@ def study(
     from coupling.studies.collect import collect
 
     plan = load_study(what)
+    check_backends(plan)
     todo = cases(plan)
     folder = Path(out) if out is not None else Path("studies") / plan.name
     tell = progress if progress is not None else lambda line: None
@@ -78,7 +79,7 @@ def study(
             if failure:
                 failures[case.key] = failure
             outcome = f"failed: {failure}" if failure else "done"
-            tell(f"{count} of {len(missing)}: case {case.index} ({_shown(case)}) {outcome}")
+            tell(f"{count} of {len(missing)}: {case.name}: {outcome}")
     status = {
         case.key: {"parameters": case.parameters, "status": "failed" if case.key in failures else "finished",
                    "message": failures.get(case.key, "")}
@@ -96,52 +97,71 @@ def case_file(folder: Path, case: Case) -> Path:
 def _run(plan, missing, folder, workers, scheduler):
     if not missing:
         return
-    if scheduler is None and (workers == 0 or len(missing) == 1):
-        yield from _in_this_process(plan, missing, folder)
-        return
-    yield from _on_cluster(plan, missing, folder, workers, scheduler)
+    cores = os.cpu_count() or 1
+    count = min(cores if workers is None else workers, len(missing))
+    if scheduler is not None:
+        yield from _on_cluster(plan, missing, folder, scheduler)
+    elif count > 1:
+        yield from _in_processes(plan, missing, folder, count, max(1, cores // count))
+    else:
+        yield from _in_this_process(plan, missing, folder, cores)
 
 
-def _arguments(plan, case, folder):
-    return case.scene.source, str((folder / CASES / case.key).absolute()), plan.backends, plan.records
+def _arguments(plan, case, folder, threads=1):
+    return case.scene.source, str((folder / CASES / case.key).absolute()), plan.backends, plan.records, threads
 
 
-def _in_this_process(plan, missing, folder):
+def _in_this_process(plan, missing, folder, threads):
     for case in missing:
         try:
-            run_case(*_arguments(plan, case, folder))
+            run_case(*_arguments(plan, case, folder, threads))
         except Exception as failure:  # whatever goes wrong in a case is reported and costs only that case
-            yield case, f"{type(failure).__name__}: {failure}"
+            yield case, _text(failure)
         else:
             yield case, ""
 
 
-def _on_cluster(plan, missing, folder, workers, scheduler):
-    import dask
-    from distributed import Client, LocalCluster
+def _in_processes(plan, missing, folder, count, threads):
+    from coupling.studies.pool import Pool, WorkerLost
 
-    cluster = None
+    calls = {case.key: _arguments(plan, case, folder, threads) for case in missing}
+    found = {case.key: case for case in missing}
+    losses: dict[str, int] = {}
+    with Pool(count) as pool:
+        import xarray  # noqa: F401, needed in the end, loaded while the workers load what they need
+
+        for key, ended in pool.run(run_case, calls):
+            if isinstance(ended, WorkerLost):
+                losses[key] = 1
+            else:
+                yield found[key], ended
+        if not losses:
+            return
+    # what lost its process again, with nothing beside it, so that a further loss is its own doing
+    with Pool(1) as pool:
+        while losses:
+            for key, ended in pool.run(run_case, {key: calls[key] for key in losses}):
+                losses[key] += 1
+                if not isinstance(ended, WorkerLost) or losses[key] == LOSSES:
+                    yield found[key], _text(ended) if isinstance(ended, WorkerLost) else ended
+                    del losses[key]
+
+
+def _on_cluster(plan, missing, folder, scheduler):
+    import dask
+    from distributed import Client
+
     # Every loss of a worker comes back here at once: the scheduler would blame all cases that waited on it.
-    with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
-        if scheduler is None:
-            count = min(workers or os.cpu_count() or 1, len(missing))
-            cluster = LocalCluster(
-                n_workers=count, threads_per_worker=1, processes=True, dashboard_address=":0", memory_limit=0,
-            )  # fmt: skip
-        try:
-            with Client(cluster if cluster is not None else scheduler) as client:
-                lost = []
-                at_once = sum(worker["nthreads"] for worker in client.scheduler_info(n_workers=-1)["workers"].values())
-                for case, failure in _submitted(client, plan, missing, folder, max(at_once, 1)):
-                    if isinstance(failure, _lost()):
-                        lost.append(case)
-                    else:
-                        yield case, _text(failure)
-                for case in lost:
-                    yield case, _alone(client, plan, case, folder)
-        finally:
-            if cluster is not None:
-                cluster.close()
+    with dask.config.set({"distributed.scheduler.allowed-failures": 0}), Client(scheduler) as client:
+        lost = []
+        at_once = sum(worker["nthreads"] for worker in client.scheduler_info(n_workers=-1)["workers"].values())
+        for case, failure in _submitted(client, plan, missing, folder, max(at_once, 1)):
+            if isinstance(failure, _lost()):
+                lost.append(case)
+            else:
+                yield case, _text(failure)
+        for case in lost:
+            yield case, _alone(client, plan, case, folder)
 
 
 def _submitted(client, plan, todo, folder, at_once):
@@ -207,16 +227,6 @@ def _lost():
 
 def _text(failure):
     return "" if failure is None else f"{type(failure).__name__}: {failure}"
-
-
-def _shown(case: Case) -> str:
-    return (
-        ", ".join(
-            f"{name} = {value:g}" if isinstance(value, float) else f"{name} = {value}"
-            for name, value in case.changes.items()
-        )
-        or "as it is"
-    )
 
 
 def _write_json(path: Path, data: Any):

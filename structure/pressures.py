@@ -1,0 +1,224 @@
+"""Pressures as lining models take them: in Pa over seconds and degrees, complete around the ring, of a usual size."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from structure.ring import Ring
+
+PRESSURES = ("soil_pressure", "water_pressure", "soil_shear")
+FEWEST_ANGLES = 8
+#: Between angles pressures are linear: what lies in a wider gap is not known [degree].
+WIDEST_GAP = 60.0
+#: A ring is pulled all around where the mean is below this share of the largest size, which a few cells do not change.
+PULLED = 0.25
+#: Largest pressures outside of this are no tunnel's: less than 0.1 m of water, more than 2 km of rock [Pa].
+USUAL_PRESSURE = (1e3, 5e7)
+
+
+def check_pressures(pressures: xr.Dataset, ring: Ring | None = None) -> xr.Dataset:
+    """Pressures as a model takes them; what they cannot mean is refused, what they hardly mean is warned of.
+
+    Parameters
+    ----------
+    pressures : xarray.Dataset
+        soil_pressure, water_pressure, soil_shear (time, theta) in the units of their attributes, Pa where there are
+        none; theta in degree, rad, gon, degree where there are none; time in s, ms, h, as dates or as durations, s
+        where there are none.
+    ring : structure.Ring, optional
+        Whose weight the pressures are compared with.
+
+    Returns
+    -------
+    xarray.Dataset
+        The three variables [Pa], and inflow_mass where it is given, over time [s], from the first record where it was
+        given as dates, and theta [degree], ascending in [0, 360). Attributes are kept.
+
+    Raises
+    ------
+    ValueError
+        Rule, name, value, remedy.
+    """
+    _require_variables(pressures)
+    kept = [*PRESSURES, *(["inflow_mass"] if "inflow_mass" in pressures else [])]
+    found = pressures[kept].assign_coords(time=_time(pressures["time"]), theta=_angles(pressures["theta"]))
+    for name in PRESSURES:
+        variable = found[name]
+        values = _in_unit(variable.values, variable.attrs.get("units", "Pa"), "Pa", name)
+        bad = int((~np.isfinite(values)).sum())
+        if bad:
+            raise ValueError(f"pressures: {name} must be finite, got {bad} values that are not; drop those times")
+        found[name] = variable.copy(data=values).assign_attrs(units="Pa").transpose("time", "theta")
+    found = _around_the_ring(found.sortby("theta"))
+    _warn_of_size(found, ring)
+    return found
+
+
+def _require_variables(pressures):
+    missing = [name for name in PRESSURES if name not in pressures]
+    if missing:
+        raise ValueError(
+            f"pressures: {', '.join(missing)} must be given, got {sorted(map(str, pressures.data_vars))};"
+            " add zeros for an action that is absent"
+        )
+    for name in PRESSURES:
+        variable = pressures[name]
+        if set(variable.dims) != {"time", "theta"}:
+            raise ValueError(
+                f"pressures: {name} must have the dimensions (time, theta), got {variable.dims};"
+                " select one tunnel, or expand_dims(time=[0.0]) for a single state"
+            )
+    for name in ("time", "theta"):
+        if name not in pressures.coords:
+            raise ValueError(f"pressures: coordinate {name} must be given, got none; assign_coords({name}=...)")
+    if pressures.sizes["time"] == 0:
+        raise ValueError("pressures: time must have at least one record, got none; wait for the first output")
+
+
+def _time(time):
+    """The coordinate in seconds."""
+    units = str(time.attrs.get("units", "s"))
+    values, about = time.values, {"units": "s", "long_name": time.attrs.get("long_name", "time")}
+    if " since " in units:
+        values, units = _dates(values, units, time.attrs.get("calendar")), "s"
+    if values.dtype.kind == "M":
+        about |= {"long_name": "time since the first record", "time_origin": str(values[0])}
+        values = values - values[0]
+    if values.dtype.kind == "m":
+        missing = np.isnat(values)
+        values, units = np.where(missing, np.nan, values / np.timedelta64(1, "ns") * 1e-9), "s"
+    values = _in_unit(values, units, "s", "time")
+    if not np.isfinite(values).all():
+        raise ValueError(
+            f"pressures: time must be finite, got {int((~np.isfinite(values)).sum())} values that are not; drop them"
+        )
+    if np.any(np.diff(values) <= 0):
+        k = int(np.argmax(np.diff(values) <= 0))
+        raise ValueError(
+            f"pressures: time must increase from record to record, got {values[k + 1]:g} s after {values[k]:g} s; "
+            "sortby('time') and drop repeated records"
+        )
+    return "time", values, about
+
+
+def _dates(values, units, calendar):
+    import xarray as xr
+
+    attributes = {"units": units, **({"calendar": calendar} if calendar else {})}
+    try:
+        return xr.decode_cf(xr.Dataset({"time": ("time", values, attributes)}))["time"].values
+    except ValueError as problem:
+        raise ValueError(f"pressures: time must be dates of CF, got units {units!r}: {problem}; correct them") from None
+
+
+def _angles(theta):
+    """The coordinate in degrees in [0, 360), in the order given."""
+    values = _in_unit(theta.values, str(theta.attrs.get("units", "degree")), "degree", "theta")
+    bad = int((~np.isfinite(values)).sum())
+    if bad:
+        raise ValueError(
+            f"pressures: theta must be finite, got {bad} angles that are not; drop them, with their values"
+        )
+    if values is not theta.values:  # of 2 pi rad, say, a last digit may be left
+        values = np.round(values, 10)
+    about = {"units": "degree", "long_name": "angle from the crown, clockwise"}
+    return "theta", values % 360, {**theta.attrs, **about}
+
+
+def _around_the_ring(found):
+    """Without an angle that stands there twice with the same values; complete around the ring."""
+    import xarray as xr
+
+    theta = found["theta"].values
+    twice = np.flatnonzero(np.diff(theta) == 0)
+    for k in twice:
+        one, other = (found[list(PRESSURES)].isel(theta=j, drop=True) for j in (k, k + 1))
+        if not one.drop_vars("theta", errors="ignore").equals(other.drop_vars("theta", errors="ignore")):
+            raise ValueError(
+                f"pressures: theta must hold every angle once, got {theta[k]:g} degrees twice with different values; "
+                "drop one of them"
+            )
+    found = found.isel(theta=np.setdiff1d(np.arange(len(theta)), twice + 1))
+    theta = found["theta"].values
+    if len(theta) < FEWEST_ANGLES:
+        raise ValueError(
+            f"pressures: theta must hold at least {FEWEST_ANGLES} different angles in [0, 360) degrees, got "
+            f"{len(theta)}; add angles, interpolated where nothing was measured"
+        )
+    gaps = np.diff(np.append(theta, theta[0] + 360))
+    k = int(np.argmax(gaps))
+    if gaps[k] > WIDEST_GAP + 1e-9:
+        hint = "give theta its units where it is in radians" if theta[-1] <= 2 * np.pi + 1e-6 else (
+            "mirror a half ring: append the values at 360 - theta, soil_shear with the other sign"
+        )  # fmt: skip
+        raise ValueError(
+            f"pressures: theta must leave no gap of more than {WIDEST_GAP:g} degrees, got {gaps[k]:.4g} after "
+            f"{theta[k]:g} degrees; add angles there, or {hint}"
+        )
+    return found if isinstance(found, xr.Dataset) else xr.Dataset(found)
+
+
+def _warn_of_size(found, ring):
+    """Say where pressures are those of no tunnel: the wrong sign or unit."""
+    total = (found["soil_pressure"] + found["water_pressure"]).transpose("time", "theta").values
+    mean, largest = total.mean(axis=1), float(np.abs(total).max())
+    least, most = USUAL_PRESSURE
+    what = "0.1 m of water"
+    if ring is not None:
+        least, what = ring.concrete_unit_weight * ring.thickness, "the weight of the ring"
+    if mean.min() < -PULLED * largest:
+        told = (
+            f"soil and water pull the ring outward all around, {mean.min() / 1e3:.3g} kPa in the mean at "
+            f"{found['time'].values[mean.argmin()]:g} s; inward is positive, change the sign if yours is not"
+        )
+    elif 0 < largest < least:
+        told = (
+            f"soil and water are {largest:.3g} Pa at most, less than {what} ({least:.3g} Pa); numbers without units "
+            "are taken as Pa, give e.g. units = 'kPa'"
+        )
+    elif largest > most:
+        told = f"soil and water are up to {largest:.3g} Pa, beyond any tunnel's ({most:.1g} Pa); check their units"
+    else:
+        return
+    warnings.warn(f"pressures: {told}", stacklevel=3)
+
+
+@cache
+def _registry():
+    import pint  # loaded only where units are not SI
+
+    return pint.UnitRegistry()
+
+
+#: Names of units that pint does not know or reads as something else.
+SPELLINGS = {"": "1", "sec": "s", "degrees_clockwise": "degree", "°": "degree"}
+
+
+def _in_unit(values, units, wanted, name):
+    """Values as float64 in another unit."""
+    try:
+        numbers = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"pressures: {name} must be numbers in {wanted}, got {values.dtype}; convert them") from None
+    if units in (wanted, f"{wanted}s"):
+        return numbers
+    # CF writes N m-2
+    text = re.sub(r"([a-zA-Z])(-?[0-9])", r"\1**\2", SPELLINGS.get(units.strip(), units.strip()))
+    text = re.sub(r"(?<=[\w)])\s+(?=[a-zA-Z])", "*", text)
+    try:
+        if not re.fullmatch(r"[\w*/^ .()°-]{1,40}", text):
+            raise ValueError("no unit")
+        factor = _registry().Quantity(1.0, text).to(wanted).magnitude
+    except Exception:
+        raise ValueError(
+            f"pressures: {name} must be in {wanted}, got {units!r}; convert it, or correct its units"
+        ) from None
+    return numbers * factor
