@@ -35,10 +35,11 @@ K0 = 3.0 / 7.0
 NUMERICS = (
     ("as the scene has it", {}),
     ("half the elements across the gate", {"across": 0.5}),
-    ("twice the elements across the gate", {"across": 2}),
+    ("twice the elements across the gate", {"across": 2.0}),
+    ("all elements twice as large", {"size": 2.0}),
     ("all elements 1.4 times as large", {"size": 1.4}),
     ("all elements 0.7 times as large", {"size": 0.7}),
-    ("all elements half as large", {"size": 0.5}),
+    ("elements half as large but across the gate", {"size": 0.5, "across": 1.0}),
     ("12 points an element everywhere", {"discretisation": {"points_per_element": 12}}),
     ("3 points an element everywhere", {"discretisation": {"points_per_element_gate": 3}}),
     ("pressure_filter 0 (off)", {"numerics": {"pressure_filter": 0.0}}),

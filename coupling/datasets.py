@@ -558,8 +558,13 @@ def read_mesh(path):
 
 
 def read_response(path, model="beam-spring", tunnel=None):
-    """The response of the lining of the tunnel with the gate, or of another `tunnel` by its number, in memory."""
-    return read_group(path, structure_group(model, tunnel))
+    """The response of the lining of the tunnel with the gate, or of another `tunnel` by its number, in memory.
+
+    It is at the angles of the pressures; what an earlier version stored between them is interpolated.
+    """
+    from structure.lining import at_whole_degrees
+
+    return at_whole_degrees(read_group(path, structure_group(model, tunnel)))
 
 
 def read_group(path, group, row=None):

@@ -101,17 +101,33 @@ def _teller(warn):
 
 
 def finish(scene, folder, progress):
-    """Response of the ring to a run's pressures and all pictures; returns the paths of the pictures."""
-    from coupling.figures import draw_run
+    """Response of the ring to a run's pressures and all pictures; returns the paths of the pictures.
 
+    Raises
+    ------
+    RunRefused, structure.LiningFailure
+        As :func:`respond`, once the pictures of the ground are drawn.
+    """
+    from coupling.figures import draw_run
+    from structure import LiningFailure
+
+    failure = None
     if scene.ring is not None and scene.mpm.tunnels:
         progress({"stage": "respond"})
-        response = respond(scene, read_pressures(folder))
-        write_response(folder / RUN_FILE, response)
-        respond_beside(scene, folder)
-        write_quality(folder / RUN_FILE, response)
+        try:
+            response = respond(scene, read_pressures(folder))
+            write_response(folder / RUN_FILE, response)
+            write_quality(folder / RUN_FILE, response)
+            respond_beside(scene, folder)
+        except (RunRefused, LiningFailure) as problem:
+            log.error("ring: %s", problem)
+            failure = problem
     progress({"stage": "figures"})
-    return draw_run(folder, folder / FIGURES)
+    pictures = draw_run(folder, folder / FIGURES)
+    if failure is not None:
+        failure.add_note(f"the ground is computed and drawn in {folder}; change the ring, then: gush respond {folder}")
+        raise failure
+    return pictures
 
 
 def respond(scene, pressures, backend="beam-spring", tunnel=None):
@@ -161,9 +177,10 @@ def respond_by_name(ring, pressures, backend, **options):
         As :func:`respond`.
     """
     from structure import lining_model
+    from structure.lining import at_whole_degrees
 
     try:
-        return lining_model(backend)(ring, **options).respond(pressures)
+        return at_whole_degrees(lining_model(backend)(ring, **options).respond(pressures))
     except ValueError as problem:
         raise RunRefused(str(problem)) from problem
 

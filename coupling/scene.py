@@ -254,21 +254,10 @@ def ring_of(scene: Scene, tunnel: int) -> Ring:
 def ground_at_axis(scene: MpmScene, depth: float) -> dict[str, float]:
     """Soil parameters and effective stresses [Pa] at `depth` [m], for the soil springs of the ring.
 
-    Vertical effective stress is the weight of the column above less the water pressure; the soil is saturated
-    throughout, as in the MPM, and above the water table its water hangs at zero pressure; without water it is dry.
-    Horizontal: k0 times that.
+    Vertical: :meth:`mpm.Scene.vertical_stress`; horizontal: k0 times that.
     """
-    water_density = scene.water.density if scene.water is not None else 0.0
-    table_depth = scene.water.table_depth if scene.water is not None else 0.0
-    vertical = 0.0
-    bottoms = [soil.top_depth for soil in scene.soils[1:]] + [math.inf]
-    here = scene.soils[0]
-    for soil, bottom in zip(scene.soils, bottoms, strict=True):
-        if soil.top_depth < depth:
-            here = soil
-            density = (1 - soil.porosity) * soil.grain_density + soil.porosity * water_density
-            vertical += density * scene.gravity * (min(depth, bottom) - soil.top_depth)
-    vertical -= water_density * scene.gravity * max(0.0, depth - table_depth)
+    vertical = scene.vertical_stress(depth)
+    here = [soil for soil in scene.soils if soil.top_depth < depth or soil is scene.soils[0]][-1]
     return {
         "youngs_modulus": here.youngs_modulus,
         "poissons_ratio": here.poissons_ratio,

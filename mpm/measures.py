@@ -6,6 +6,9 @@ from mpm.half_model import with_mirrored_points
 from mpm.points import mass_inside
 from mpm.variables import LEDGER, MASS, POINT_VARIABLES, VLX, VLY, VSX, VSY, X0, Y0, N, P, X, Y
 
+#: Acceleration of a grain at the gate over gravity: what presses 20 m below ground, over a gate's width of 0.2 m.
+STEEPEST = 100.0
+
 
 class Measures:
     """The part of :class:`mpm.Solver` that only reads its arrays."""
@@ -41,14 +44,19 @@ class Measures:
         rho = np.array([s.grain_density for s in self.scene.soils])[self.soil_of_point]
         return self.points[:, MASS] / (rho * (1 - self.points[:, N]))
 
-    def inflow_mass(self):
-        """Grains inside the gate's tunnel, those taken out included [kg/m]."""
+    def inflow_mass(self, within=0.0):
+        """Grains inside the gate's tunnel, those taken out included [kg/m].
+
+        within : float
+            Grains that may come within this time [s] count as well.
+        """
         if self.scene.gate is None:
             return 0.0
         tunnel = self.scene.tunnels[self.scene.gate.tunnel]
         inside = mass_inside(
-            self.points, self.element_of_point, float(tunnel.x), -float(tunnel.axis_depth), float(tunnel.inner_radius)
-        )
+            self.points, self.element_of_point, float(tunnel.x), -float(tunnel.axis_depth), float(tunnel.inner_radius),
+            within, STEEPEST * self.scene.gravity,
+        )  # fmt: skip
         return self.copies * (inside + self.removed_mass)
 
     def sums_over_points(self):

@@ -20,6 +20,8 @@ from mpm.variables import (
     SXX,
     SYY,
     SZZ,
+    VSX,
+    VSY,
     X0,
     Y0,
     N,
@@ -234,11 +236,16 @@ def porosity_ranges(points, element_of_point, soil_of_point, n_soils):
 
 
 @kernel
-def mass_inside(points, element_of_point, x, y, radius):
-    """Grains of the points in elements that are inside of a circle [kg/m]; x, y, radius : float [m]."""
+def mass_inside(points, element_of_point, x, y, radius, duration, acceleration):
+    """Grains of the points in elements that are inside of a circle, or may come within a duration [kg/m].
+
+    x, y, radius : float [m];  duration : float [s];  acceleration : float [m/s2]
+        A point comes from no farther than twice its speed times the duration and acceleration times its square.
+    """
     total = 0.0
     for i in range(element_of_point.size):
-        if element_of_point[i] >= 0 and (points[i, X] - x) ** 2 + (points[i, Y] - y) ** 2 < radius**2:
+        reach = 2.0 * duration * np.sqrt(points[i, VSX] ** 2 + points[i, VSY] ** 2) + acceleration * duration**2
+        if element_of_point[i] >= 0 and (points[i, X] - x) ** 2 + (points[i, Y] - y) ** 2 < (radius + reach) ** 2:
             total += points[i, MASS]
     return total
 

@@ -26,6 +26,8 @@ MOST_RECORDS = 1_000_000
 #: Growth of the element size per metre above which neighbouring quadrilaterals are no longer near squares.
 STEEPEST = 0.25
 _HOUR = 3600.0
+#: Share of k0 that its bounds give, so that 1 - sin(phi) over 1 + sin(phi) itself is borne.
+ROUNDING = 1e-9
 #: Smallest (outer - inner) / outer diameter: the channel through a thinner lining has no length to mesh.
 MOST_SLENDER = 0.01
 
@@ -166,6 +168,16 @@ class Soil(Part):
                 f"{who}: friction_angle and cohesion must not both be 0, no strength at all; give one of them"
             )
         return self
+
+    def admissible_k0(self, vertical_stress: float) -> tuple[float, float]:
+        """Lowest and highest k0 that the strength bears under a vertical effective stress [Pa] (Mohr-Coulomb)."""
+        if self.model == "elastic" or vertical_stress <= 0:
+            return -math.inf, math.inf
+        phi = math.radians(self.friction_angle)
+        cohesive = 2 * self.cohesion * math.cos(phi) / vertical_stress
+        return (1 - math.sin(phi) - cohesive) / (1 + math.sin(phi)), (1 + math.sin(phi) + cohesive) / (
+            1 - math.sin(phi)
+        )
 
 
 def _soil(given) -> str:
@@ -315,7 +327,7 @@ class Numerics(Part):
 
 
 class Stop(Part):
-    """Where a run ends: at a time [s], at an inflow mass [kg/m], or whichever comes first."""
+    """Where a run ends: at a time [s], with the step that passes an inflow mass [kg/m], or whichever comes first."""
 
     time: Time | None = Field(default=None, gt=0, le=1e7)
     inflow_mass: Mass | None = Field(default=None, gt=0, le=1e9)
@@ -380,6 +392,7 @@ class Scene(Part):
                 f"soils: top_depth {tops[-1]:g} m must lie in the box of depth {self.box.depth:g} m; leave "
                 "the layer out, or deepen the box"
             )
+        self._check_k0()
         if self.is_two_phase:
             unknown = [soil.name for soil in self.soils if soil.hydraulic_conductivity is None]
             if unknown:
@@ -450,6 +463,50 @@ class Scene(Part):
                 f"{self.estimated_elements:.2g} elements; raise element_size, element_size_lining or size_growth"
             )
         return self
+
+    def vertical_stress(self, depth: float) -> float:
+        """Vertical effective stress of the level ground at a depth [m], compression positive [Pa].
+
+        The weight of the column above less the water pressure. The soil is saturated throughout: above the water table
+        its water hangs at zero pressure; without water it is dry.
+        """
+        water_density = self.water.density if self.water is not None else 0.0
+        vertical = 0.0
+        for soil, bottom in zip(self.soils, self._bottoms, strict=True):
+            density = (1 - soil.porosity) * soil.grain_density + soil.porosity * water_density
+            vertical += density * self.gravity * max(0.0, min(depth, bottom) - soil.top_depth)
+        table_depth = self.water.table_depth if self.water is not None else 0.0
+        return vertical - water_density * self.gravity * max(0.0, depth - table_depth)
+
+    @property
+    def _bottoms(self):
+        return [soil.top_depth for soil in self.soils[1:]] + [self.box.depth]
+
+    def _check_k0(self):
+        """Refuse a k0 that the soil does not bear in all of its layer: it would yield before the gate opens."""
+        for soil, bottom in zip(self.soils, self._bottoms, strict=True):
+
+            def borne(depth, soil=soil):
+                lowest, highest = soil.admissible_k0(self.vertical_stress(depth))
+                return lowest * (1 - ROUNDING) <= soil.k0 <= highest * (1 + ROUNDING)
+
+            # what cohesion adds fades with the stress, which is linear between these depths
+            table = soil.top_depth if self.water is None else min(max(self.water.table_depth, soil.top_depth), bottom)
+            depth = max(soil.top_depth, table, bottom, key=self.vertical_stress)
+            if borne(depth):
+                continue
+            shallow, deep = soil.top_depth, depth
+            while deep - shallow > 0.01:
+                middle = (shallow + deep) / 2
+                shallow, deep = (middle, deep) if borne(middle) else (shallow, middle)
+            lowest, highest = soil.admissible_k0(self.vertical_stress(depth))
+            at_rest = 1 - math.sin(math.radians(soil.friction_angle))
+            raise ValueError(
+                f"soil '{soil.name}': k0 must lie in {max(lowest, 0):.3f} .. {highest:.3f}, what friction_angle "
+                f"{soil.friction_angle:g} deg and cohesion {soil.cohesion:g} Pa bear at {depth:g} m, got {soil.k0:g}, "
+                f"which yields from a depth of {shallow:.3g} m; give more strength, or a k0 that it bears: "
+                f"1 - sin(friction_angle) = {at_rest:.3g} where the ground was never loaded more"
+            )
 
     @property
     def asymmetry(self):

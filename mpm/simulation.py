@@ -86,7 +86,8 @@ class Simulation:
         self._reached = False  # whether the last interval is at hand
         self._begin, self._begin_substeps, self._limits = 0.0, 0, {}
         self._next_snapshot = scene.output.snapshot_interval or np.inf
-        self._inflow, self._checked = 0.0, 0  # kg/m, and when
+        self._inflow, self._checked = 0.0, -STEPS_BETWEEN_CHECKS  # kg/m, and when
+        self._near = False  # whether the inflow may reach its stop before it is checked again
         self._progress = progress
         self._last_report = clock.monotonic(), 0
 
@@ -139,12 +140,18 @@ class Simulation:
         if stop.time is not None:
             end = min(end, stop.time)
         while solver.time < end * ALMOST_ALL and not self._reached:
-            for limit in solver.advance(end, self._checked + STEPS_BETWEEN_CHECKS - solver.step_count):
-                self._limits[limit] = self._limits.get(limit, 0) + 1
             if solver.step_count - self._checked >= STEPS_BETWEEN_CHECKS:
-                self._checked = solver.step_count
+                self._check()
+            to, most = (
+                (self._step_to(end), solver.step_count + 1)
+                if self._near
+                else (end, self._checked + STEPS_BETWEEN_CHECKS)
+            )
+            for limit in solver.advance(to, most - solver.step_count):
+                self._limits[limit] = self._limits.get(limit, 0) + 1
+            if self._near:
                 self._inflow = solver.inflow_mass()
-                self._reached = stop.inflow_mass is not None and self._inflow >= stop.inflow_mass
+                self._reached = self._inflow >= stop.inflow_mass
             self._report(limit)
             if pause is not None and pause():
                 return None
@@ -156,6 +163,28 @@ class Simulation:
         duration, count = solver.time - self._begin, solver.step_count - self._begin_substeps
         limits = {name: steps for name, steps in self._limits.items() if name != "output"} or self._limits
         return self._record(duration, duration / count, max(limits, key=limits.get), snapshot)
+
+    def _step_to(self, end):
+        """The time [s] that the next step of all levels may lead to, so that a short one passes the inflow's stop."""
+        solver, target = self.solver, self.scene.stop.inflow_mass
+        shortest, longest = self._steps_of_levels()
+        duration = min(end - solver.time, longest)
+        while duration > shortest and solver.inflow_mass(duration) >= target:
+            duration = max(duration / 2, shortest)
+            end = solver.time + duration
+        return end
+
+    def _steps_of_levels(self):
+        """Time step of the smallest elements, and the longest step of all levels [s]."""
+        shortest = self.solver.time_step_estimate()[0]
+        return shortest, shortest * 2 ** (self.solver.levels.count - 1)
+
+    def _check(self):
+        solver, target = self.solver, self.scene.stop.inflow_mass
+        shortest, longest = self._steps_of_levels()
+        self._checked, self._inflow = solver.step_count, solver.inflow_mass()
+        ahead = STEPS_BETWEEN_CHECKS * shortest + longest
+        self._near = target is not None and solver.inflow_mass(ahead) >= target
 
     def state(self):
         """All that decides how the simulation goes on, and its processor time so far.
@@ -175,6 +204,7 @@ class Simulation:
             "next_snapshot": self._next_snapshot,
             "inflow_mass": self._inflow,
             "checked": self._checked,
+            "near": self._near,
             "reached": self._reached,
             "done": self.done,
             "cpu_seconds": self.cpu_seconds,
@@ -193,7 +223,7 @@ class Simulation:
         self._begin, self._limits = float(state["interval_begin"]), json.loads(state["interval_limits"])
         self._begin_substeps = int(state["interval_begin_substeps"])
         self._next_snapshot, self._inflow = float(state["next_snapshot"]), float(state["inflow_mass"])
-        self._checked = int(state["checked"])
+        self._checked, self._near = int(state["checked"]), bool(state.get("near", True))
         self._reached, self.done = bool(state["reached"]), bool(state["done"])
         self._cpu_begin = clock.process_time() - float(state["cpu_seconds"])
         self._last_report = clock.monotonic(), self.solver.point_steps

@@ -12,8 +12,9 @@ from scipy import sparse
 from structure.ring import Ring
 from structure.springs import joint_spring
 
-#: Two Gauss points an element on [0, 1]: exact for the linear loads between samples times linear shares.
-GAUSS = (0.5 - 0.5 / np.sqrt(3), 0.5 + 0.5 / np.sqrt(3))
+#: Gauss points of a piece of an arc on [0, 1]: up to 15 degrees only rounding is left of linear tractions times linear
+#: or quadratic shares times the sine of an angle within the piece.
+POINTS, WEIGHTS = np.polynomial.legendre.leggauss(5)[0] / 2 + 0.5, np.polynomial.legendre.leggauss(5)[1] / 2
 
 
 class RingMesh:
@@ -147,6 +148,61 @@ def constant_stiffness(ring: Ring, mesh: RingMesh, with_joints: bool = True) -> 
     return sparse.coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)).tocsr()
 
 
+def arc_pieces(start: np.ndarray, span: np.ndarray, kinks: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Gauss points on arcs that are cut at kinks, so that what is smooth between the kinks is integrated exactly.
+
+    Parameters
+    ----------
+    start, span : (n_arcs,) float64
+        First angle and angle of each arc [rad], no two overlapping.
+    kinks : (n_kinks,) float64
+        [rad].
+
+    Returns
+    -------
+    arc : (n_points,) int
+        Which arc a point lies on.
+    angle : (n_points,) float64
+        [rad], from `start` on.
+    weight : (n_points,) float64
+        Angle that the point stands for [rad]; those of an arc sum to its span.
+    """
+    order = np.argsort(start % (2 * np.pi))
+    last = np.searchsorted(start[order] % (2 * np.pi), kinks % (2 * np.pi), side="right") - 1  # -1: across the crown
+    after = (kinks - start[order[last]]) % (2 * np.pi)
+    inside = after < span[order[last]]
+    ends = np.arange(len(start))
+    arcs = np.concatenate([ends, ends, order[last[inside]]])
+    cuts = np.concatenate([np.zeros(len(start)), span, after[inside]])
+    sorting = np.lexsort((cuts, arcs))
+    arcs, cuts = arcs[sorting], cuts[sorting]
+    length = np.diff(cuts)
+    kept = np.flatnonzero((arcs[1:] == arcs[:-1]) & (length > 0))
+    arc, begin, length = arcs[kept], cuts[kept], length[kept]
+    angle = (start[arc] + begin)[:, None] + length[:, None] * POINTS
+    return np.repeat(arc, len(POINTS)), angle.ravel(), (length[:, None] * WEIGHTS).ravel()
+
+
+def _moved_to_nodes(ring: Ring, mesh: RingMesh, radius: float, element: np.ndarray, angle: np.ndarray):
+    """Statically equivalent nodal forces of unit forces at points of a circle: to both nodes with the couple of moving.
+
+    Returns
+    -------
+    unknown : (n_points, 2, 3) int
+    inward, clockwise : (n_points, 2, 3) float64
+        Of a force towards the axis, and of one along the circle.
+    """
+    nodes = np.stack([mesh.first[element], mesh.second[element]], axis=1)
+    along = angle - mesh.node_angle[mesh.first[element]]
+    lean = along[:, None] - mesh.span[element][:, None] * np.array([0.0, 1.0])
+    share = along / mesh.span[element]
+    shares = np.stack([1 - share, share], axis=1)[:, :, None]
+    sine, cosine = np.sin(lean), np.cos(lean)
+    inward = np.stack([-cosine, -sine, ring.centre_radius * sine], axis=2)
+    clockwise = np.stack([-sine, cosine, radius - ring.centre_radius * cosine], axis=2)
+    return _unknowns(nodes.ravel()).reshape(*nodes.shape, 3), shares * inward, shares * clockwise
+
+
 def traction_operator(ring: Ring, mesh: RingMesh, theta: np.ndarray) -> tuple[sparse.csr_array, sparse.csr_array]:
     """Nodal forces of a pressure and of a clockwise shear on the outer face, sampled at angles `theta`.
 
@@ -161,28 +217,25 @@ def traction_operator(ring: Ring, mesh: RingMesh, theta: np.ndarray) -> tuple[sp
         Forces [N/m] and couples [N m/m] per Pa. Statically equivalent to the traction, linear between the samples: the
         force on each piece of the face goes to the two nodes of its element with the couple that moves it there.
     """
-    rows, columns, pressure_values, shear_values = [], [], [], []
-    for place in GAUSS:
-        angle = mesh.node_angle[mesh.first] + place * mesh.span
-        area = ring.outer_radius * mesh.span / 2
-        samples, shares = _periodic_interpolation(theta, angle)
-        for node, node_share in ((mesh.first, 1 - place), (mesh.second, place)):
-            lean = angle - mesh.node_angle[node]
-            lean = (lean + np.pi) % (2 * np.pi) - np.pi
-            by_pressure = [-np.cos(lean), -np.sin(lean), ring.centre_radius * np.sin(lean)]
-            by_shear = [-np.sin(lean), np.cos(lean), ring.outer_radius - ring.centre_radius * np.cos(lean)]
-            for unknown in range(3):
-                for sample, share in zip(samples, shares, strict=True):
-                    rows.append(3 * node + unknown)
-                    columns.append(sample)
-                    pressure_values.append(area * node_share * share * by_pressure[unknown])
-                    shear_values.append(area * node_share * share * by_shear[unknown])
-    place = (np.concatenate(rows), np.concatenate(columns))
-    shape = (3 * mesh.n_nodes, len(theta))
-    return tuple(
-        sparse.coo_array((np.concatenate(values), place), shape=shape).tocsr()
-        for values in (pressure_values, shear_values)
-    )
+    element, angle, weight = arc_pieces(mesh.node_angle[mesh.first], mesh.span, theta)
+    unknown, *parts = _moved_to_nodes(ring, mesh, ring.outer_radius, element, angle)
+    area = (ring.outer_radius * weight)[:, None, None]
+    return tuple(sampled_operator(unknown, area * part, theta, angle, 3 * mesh.n_nodes) for part in parts)
+
+
+def sampled_operator(
+    unknown: np.ndarray, values: np.ndarray, theta: np.ndarray, angle: np.ndarray, n_unknowns: int
+) -> sparse.csr_array:
+    """Nodal forces per sample at `theta` from those per traction at points, (n_unknowns, n_theta).
+
+    unknown, values : (n_points, ...);  angle : (n_points,) of the points [rad].
+    """
+    samples, shares = _periodic_interpolation(theta, angle)
+    count = values[0].size
+    columns = np.concatenate([np.repeat(sample, count) for sample in samples])
+    shared = np.concatenate([np.repeat(share, count) * values.ravel() for share in shares])
+    rows = np.tile(unknown.ravel(), 2)
+    return sparse.coo_array((shared, (rows, columns)), shape=(n_unknowns, len(theta))).tocsr()
 
 
 def _periodic_interpolation(theta: np.ndarray, angle: np.ndarray):
@@ -195,10 +248,44 @@ def _periodic_interpolation(theta: np.ndarray, angle: np.ndarray):
     return (before % len(theta), after), (1 - share, share)
 
 
+def forces_at(mesh: RingMesh, theta: np.ndarray) -> sparse.csr_array:
+    """Section forces at angles theta [rad] from those at the middles of the elements, (n_theta, n_elements).
+
+    Linear between the middles, also across a joint, which passes on all that reaches it.
+    """
+    middle = mesh.mid_angle % (2 * np.pi)
+    order = np.argsort(middle)
+    samples, shares = _periodic_interpolation(middle[order], theta)
+    place = (np.tile(np.arange(len(theta)), 2), order[np.concatenate(samples)])
+    return sparse.coo_array((np.concatenate(shares), place), shape=(len(theta), len(middle))).tocsr()
+
+
+def displacements_at(mesh: RingMesh, theta: np.ndarray) -> tuple[sparse.csr_array, sparse.csr_array]:
+    """Radial and tangential displacement of the centre line at theta [rad], (n_theta, 3 n_nodes) each.
+
+    Straight between the two nodes of an element. On a joint one of its sides is taken.
+    """
+    along = (theta[:, None] - mesh.node_angle[mesh.first]) % (2 * np.pi)
+    element = np.argmax(along <= mesh.span, axis=1)
+    share = along[np.arange(len(theta)), element] / mesh.span[element]
+    rows, columns, radial, tangential = [], [], [], []
+    for nodes, of_node in ((mesh.first[element], 1 - share), (mesh.second[element], share)):
+        cosine, sine = np.cos(theta - mesh.node_angle[nodes]), np.sin(theta - mesh.node_angle[nodes])
+        for way, values in enumerate(((cosine, -sine), (sine, cosine))):
+            rows.append(np.arange(len(theta)))
+            columns.append(3 * nodes + way)
+            radial.append(of_node * values[0])
+            tangential.append(of_node * values[1])
+    place, shape = (np.concatenate(rows), np.concatenate(columns)), (len(theta), 3 * mesh.n_nodes)
+    return tuple(
+        sparse.coo_array((np.concatenate(values), place), shape=shape).tocsr() for values in (radial, tangential)
+    )
+
+
 def self_weight(ring: Ring, mesh: RingMesh) -> np.ndarray:
     """Nodal forces of the concrete's weight, (3 n_nodes,); all of it on the centre line."""
-    weight = ring.concrete_unit_weight * ring.thickness * ring.centre_radius * mesh.node_span
-    forces = np.zeros((mesh.n_nodes, 3))
-    forces[:, 0] = -weight * np.cos(mesh.node_angle)
-    forces[:, 1] = weight * np.sin(mesh.node_angle)
-    return forces.ravel()
+    element, angle, weight = arc_pieces(mesh.node_angle[mesh.first], mesh.span, np.zeros(0))
+    unknown, inward, clockwise = _moved_to_nodes(ring, mesh, ring.centre_radius, element, angle)
+    force = (ring.concrete_unit_weight * ring.thickness * ring.centre_radius * weight)[:, None, None]
+    downward = np.cos(angle)[:, None, None] * inward + np.sin(angle)[:, None, None] * clockwise
+    return np.bincount(unknown.ravel(), (force * downward).ravel(), 3 * mesh.n_nodes)

@@ -5,10 +5,18 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from structure.balance import refuse_unbalanced
-from structure.beam_geometry import RingMesh, element_matrices, joint_matrices, self_weight, traction_operator
+from structure.balance import borne, even_loads, without_unborne
+from structure.beam_geometry import (
+    RingMesh,
+    displacements_at,
+    element_matrices,
+    forces_at,
+    joint_matrices,
+    self_weight,
+    traction_operator,
+)
 from structure.equilibrium import NoEquilibrium, RingEquilibrium
-from structure.lining import LiningFailure, LiningModel, check_pressures, response_dataset
+from structure.lining import SIDES, THETA, LiningFailure, LiningModel, check_pressures, response_dataset
 from structure.ring import Ring
 from structure.springs import joint_spring, limit_pressures
 
@@ -22,9 +30,10 @@ class BeamSpringLining(LiningModel):
 
     Notes
     -----
-    Forces are taken at the middle of every element, where the chord is parallel to the circle; so theta of the
-    response never falls on a joint. Soil springs start unstressed at the undeformed ring: the pressures given are what
-    the soil exerts there, and the springs add what the ring's displacement mobilises.
+    Forces are taken at the middle of every element, where the chord is parallel to the circle, and are linear between
+    the middles. Displacements on a joint are the mean of its two sides. Soil springs start unstressed at the undeformed
+    ring: the pressures given are what the soil exerts there, and the springs add what the ring's displacement
+    mobilises.
     """
 
     def __init__(self, ring: Ring):
@@ -34,11 +43,13 @@ class BeamSpringLining(LiningModel):
         held = np.zeros(0, dtype=int) if ring.ground is not None else 3 * self._invert + np.arange(3)
         self._equilibrium = RingEquilibrium(ring, self.mesh, held)
         self._element_forces = element_matrices(ring, self.mesh)[0]
+        self._forces_at = forces_at(self.mesh, np.radians(THETA))
+        sides = [displacements_at(self.mesh, np.radians(THETA) + side) for side in SIDES]
+        self._movement = tuple((one + other) / 2 for one, other in zip(*sides, strict=True))
         self._weight = self_weight(ring, self.mesh)
         self._joint_jumps = joint_matrices(ring)[0]
         fine = np.radians(np.arange(0, 360, 0.5))
-        lift = traction_operator(ring, self.mesh, fine)[0] @ np.cos(fine)
-        self._unit_balance = lift / self._resultant(lift)[1]
+        self._uplift, self._even = even_loads(fine, *traction_operator(ring, self.mesh, fine), self._resultant)
 
     def respond(self, pressures: xr.Dataset) -> xr.Dataset:
         ordered = check_pressures(pressures, self.ring)
@@ -46,14 +57,17 @@ class BeamSpringLining(LiningModel):
         times = ordered["time"].values
         shear = ordered["soil_shear"].values.astype(float)
         loads, balanced = self._loads(theta, ordered["soil_pressure"] + ordered["water_pressure"], shear)
-        refuse_unbalanced(self.ring, self._resultant(loads), self._magnitude(loads), times)
+        loads, unborne = without_unborne(
+            self.ring, loads, self._resultant(loads), self._magnitude(loads), self._even, times
+        )
         displacements, slips = self._displacements(loads, times)
         springs = np.stack([self._equilibrium.spring_forces(row)[0].ravel() for row in displacements])
-        fields = {"balanced_uplift": balanced}
-        fields |= self._internal_forces(displacements)
+        fields = {"balanced_uplift": balanced, "unborne_resultant": unborne}
+        of_elements = self._internal_forces(displacements)
+        fields |= {name: (self._forces_at @ values.T).T for name, values in of_elements.items()}
         fields |= self._joints(displacements, slips)
         fields |= self._balances(displacements, slips, loads, springs)
-        fields["shear_moment_residual"] = self._shear_moment_residual(fields, theta, shear, springs)
+        fields["shear_moment_residual"] = self._shear_moment_residual(of_elements, theta, shear, springs)
         fields |= self._movements(displacements)
         return self._dataset(ordered, fields, times)
 
@@ -64,7 +78,7 @@ class BeamSpringLining(LiningModel):
         balanced = np.zeros(len(loads))
         if self.ring.balance_uplift:
             balanced = self._resultant(loads)[1]
-            loads = loads - balanced[:, None] * self._unit_balance
+            loads = loads - balanced[:, None] * self._uplift
         return loads, balanced
 
     def _resultant(self, forces: np.ndarray) -> np.ndarray:
@@ -149,7 +163,7 @@ class BeamSpringLining(LiningModel):
         }
 
     def _shear_moment_residual(self, fields, theta, shear, springs):
-        """Largest |Q + dM/ds + couple| at the nodes, from the reported forces: checks results, not matrices.
+        """Largest |Q + dM/ds + couple| at the nodes, from the forces of the elements: checks results, not matrices.
 
         The couple per arc of the centre line is what the shear and the tangential soil springs on the outer face bring.
         """
@@ -176,9 +190,9 @@ class BeamSpringLining(LiningModel):
         return np.abs(gap).max(1)
 
     def _movements(self, displacements):
-        """Displacements at the middle of the elements, change of the diameters, settlement.
+        """Displacements at the angles of the response, change of the diameters, settlement.
 
-        A ring that nothing holds has no place of its own: its mean movement is taken out.
+        A ring has no place of its own where nothing holds it: that mean movement is taken out.
         """
         mesh = self.mesh
         nodal = displacements.reshape(len(displacements), -1, 3)
@@ -186,43 +200,30 @@ class BeamSpringLining(LiningModel):
         radial, tangential = nodal[..., 0], nodal[..., 1]
         right = ((radial * sine + tangential * cosine) * share).sum(1, keepdims=True)
         up = ((radial * cosine - tangential * sine) * share).sum(1, keepdims=True)
-        if self.ring.ground is None and self.ring.support == "free":
+        sideways, _, turning = borne(self.ring)
+        if not sideways:
             radial = radial - right * sine - up * cosine
             tangential = tangential - right * cosine + up * sine
-            tangential = tangential - (tangential * share).sum(1, keepdims=True)
             up = np.zeros_like(up)
-        crown, right_waist, invert, left_waist = (self._radial_at(radial, quarter * np.pi / 2) for quarter in range(4))
-        lean = mesh.span / 2
-        first_w, second_w = radial[:, mesh.first], radial[:, mesh.second]
-        first_v, second_v = tangential[:, mesh.first], tangential[:, mesh.second]
+        if not turning:
+            tangential = tangential - (tangential * share).sum(1, keepdims=True)
+        moved = np.zeros_like(nodal)
+        moved[..., 0], moved[..., 1] = radial, tangential
+        outward, along = ((part @ moved.reshape(displacements.shape).T).T for part in self._movement)
+        crown, right_waist, invert, left_waist = outward[:, :: len(THETA) // 4].T
         return {
-            "displacement_radial": ((first_w + second_w) * np.cos(lean) + (first_v - second_v) * np.sin(lean)) / 2,
-            "displacement_tangential": ((first_v + second_v) * np.cos(lean) + (second_w - first_w) * np.sin(lean)) / 2,
+            "displacement_radial": outward,
+            "displacement_tangential": along,
             "convergence_horizontal": -(right_waist + left_waist),
             "convergence_vertical": -(crown + invert),
             "settlement": -up[:, 0],
         }
 
-    def _radial_at(self, radial, angle):
-        """Radial displacement at an angle [rad], linear in the element; the mean of both sides on a joint."""
-        mesh = self.mesh
-        sides = []
-        for nudge in (-1e-9, 1e-9):
-            along = (angle + nudge - mesh.node_angle[mesh.first]) % (2 * np.pi)
-            element = int(np.argmax(along <= mesh.span))
-            share = along[element] / mesh.span[element]
-            sides.append(radial[:, mesh.first[element]] * (1 - share) + radial[:, mesh.second[element]] * share)
-        return (sides[0] + sides[1]) / 2
-
     def _dataset(self, pressures, fields, times):
-        degrees = np.degrees(self.mesh.mid_angle) % 360
-        order = np.argsort(degrees)
-        per_element = ("axial_force", "shear_force", "bending_moment", "displacement_radial", "displacement_tangential")
-        fields |= {name: fields[name][:, order] for name in per_element}
         joints = np.array(self.ring.joint_angles, dtype=float)
         coordinates = {
             "time": ("time", times),
-            "theta": ("theta", np.round(degrees[order], 10)),
+            "theta": ("theta", THETA),
             "joint": ("joint", np.arange(1, len(joints) + 1)),
             "joint_angle": ("joint", joints),
         }
@@ -237,10 +238,6 @@ class BeamSpringLining(LiningModel):
             attributes["limit_pressures"] = f"normal {normal:.6g} Pa, tangential {tangential:.6g} Pa"
         response = response_dataset(fields, coordinates, attributes)
         response["time"].attrs |= pressures["time"].attrs
-        half = np.degrees(self.mesh.span[order]) / 2
-        centre = response["theta"].values
-        response["theta"].attrs["bounds"] = "theta_bnds"
-        response = response.assign_coords(theta_bnds=(("theta", "bounds"), np.stack([centre - half, centre + half], 1)))
         if "inflow_mass" in pressures:
             response["inflow_mass"] = pressures["inflow_mass"]
         return response

@@ -8,8 +8,7 @@ import numpy as np
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
-from structure.balance import refuse_unbalanced
-from structure.beam_geometry import RingMesh
+from structure.balance import borne, even_loads, without_unborne
 from structure.continuum_bolts import Bolts, anchor_place, bolt_elongation, bolt_shares, check_bolts, near_anchors
 from structure.continuum_equilibrium import SpringEquilibrium
 from structure.continuum_face import spring_feelers, traction_operator
@@ -17,7 +16,7 @@ from structure.continuum_mesh import EDGE_MEAN, ContinuumMesh, GasketGroove, Ope
 from structure.continuum_sections import section_displacements, section_forces
 from structure.continuum_stiffness import Concrete, joint_operators, joint_stiffness, nodes_from_unknowns
 from structure.equilibrium import NoEquilibrium
-from structure.lining import LiningFailure, LiningModel, check_pressures, response_dataset
+from structure.lining import SIDES, THETA, LiningFailure, LiningModel, check_pressures, response_dataset
 from structure.ring import Ring
 from structure.springs import joint_spring, limit_pressures
 
@@ -37,8 +36,8 @@ class ContinuumLining(LiningModel):
     Parameters
     ----------
     ring : Ring
-        ``n_elements`` sets the angles of the response only. The concrete always deforms in shear, so
-        section="euler-bernoulli" is refused.
+        Its ``n_elements`` means nothing here. The concrete always deforms in shear, so section="euler-bernoulli" is
+        refused.
     columns : int
         Elements around the ring.
     layers : int
@@ -93,10 +92,9 @@ class ContinuumLining(LiningModel):
         # A strip's faces stand apart, so its anchors meet no line offset from them.
         anchor = anchor_place(ring, bolts)[0] if bolts is not None and width == 0 else None
         self.mesh = ContinuumMesh(ring, columns, layers, width, opening, groove, anchor)
-        self._grid = RingMesh(ring)
-        order = np.argsort(np.degrees(self._grid.mid_angle) % 360)
-        self._theta, self._span = self._grid.mid_angle[order] % (2 * np.pi), self._grid.span[order]
-        self._solid = self.mesh.locate(self._theta)[0] >= 0
+        self._theta = np.radians(THETA)
+        self._sides = [(self._theta + side) % (2 * np.pi) for side in SIDES]
+        self._solid = np.all([self.mesh.locate(side)[0] >= 0 for side in self._sides], axis=0)
         concrete = Concrete(ring, self.mesh, width)
         #: Node displacements from the unknowns solved for; jumps across joints are unknowns themselves.
         self._to_nodes = nodes_from_unknowns(self.mesh)
@@ -111,7 +109,8 @@ class ContinuumLining(LiningModel):
         self._joints = [part @ self._to_nodes for part in joint_operators(ring, self.mesh)]
         self._forces = section_forces(self.mesh, self._stress, ring.centre_radius, self._theta)
         self._strip_forces = section_forces(self.mesh, self._stress, ring.centre_radius, np.radians(ring.joint_angles))
-        self._movement = section_displacements(self.mesh, self._theta)
+        movements = [section_displacements(self.mesh, side) for side in self._sides]
+        self._movement = [(one + other) / 2 for one, other in zip(*movements, strict=True)]
         self._quarters = self._quarter_sides()
         self._share = self._node_share()
         feel, area = spring_feelers(ring, self.mesh)
@@ -129,8 +128,7 @@ class ContinuumLining(LiningModel):
             0.0 if bolts is None else bolts.stiffness,
         )
         fine = np.radians(np.arange(0, 360, 0.5))
-        lift = traction_operator(ring, self.mesh, fine)[0] @ np.cos(fine)
-        self._unit_balance = lift / self._resultant(lift)[1]
+        self._uplift, self._even = even_loads(fine, *traction_operator(ring, self.mesh, fine), self._resultant)
 
     @property
     def iterations(self) -> list[int]:
@@ -145,9 +143,8 @@ class ContinuumLining(LiningModel):
     def respond(self, pressures: xr.Dataset) -> xr.Dataset:
         ordered = check_pressures(pressures, self.ring)
         times = ordered["time"].values
-        unknowns, loads, balanced = self._solve(ordered)
+        unknowns, loads, fields = self._solve(ordered)
         displacements = (self._to_nodes @ unknowns.T).T
-        fields = {"balanced_uplift": balanced}
         fields |= self._internal_forces(unknowns, displacements)
         fields |= self._joint_fields(unknowns)
         fields |= self._balances(unknowns, loads)
@@ -211,7 +208,7 @@ class ContinuumLining(LiningModel):
         return whole if self.ring.support == "invert" else whole[[1, -2, -1]]
 
     def _solve(self, ordered):
-        """Unknowns and the loads on them (n_times, n_unknowns), and the uplift balanced among the loads."""
+        """Unknowns and the loads on them (n_times, n_unknowns), and the fields of what was balanced."""
         theta, times = np.radians(ordered["theta"].values.astype(float)), ordered["time"].values
         by_pressure, by_shear = traction_operator(self.ring, self.mesh, theta)
         pressure = (ordered["soil_pressure"] + ordered["water_pressure"]).values.astype(float)
@@ -219,8 +216,9 @@ class ContinuumLining(LiningModel):
         balanced = np.zeros(len(loads))
         if self.ring.balance_uplift:
             balanced = self._resultant(loads)[1]
-            loads = loads - balanced[:, None] * self._unit_balance
-        refuse_unbalanced(self.ring, self._resultant(loads), np.array([_magnitude(row) for row in loads]), times)
+            loads = loads - balanced[:, None] * self._uplift
+        magnitude = np.array([_magnitude(row) for row in loads])
+        loads, unborne = without_unborne(self.ring, loads, self._resultant(loads), magnitude, self._even, times)
         loads = (self._to_nodes.T @ loads.T).T
         unknowns = np.zeros_like(loads)
         self._equilibrium.iterations.clear()
@@ -229,7 +227,7 @@ class ContinuumLining(LiningModel):
         with threadpool_limits(limits=1, user_api="blas"):
             for index, load in enumerate(loads):
                 unknowns[index] = start = self._solve_one(load, start, float(times[index]))
-        return unknowns, loads, balanced
+        return unknowns, loads, {"balanced_uplift": balanced, "unborne_resultant": unborne}
 
     def _solve_one(self, load, start, time):
         try:
@@ -306,33 +304,29 @@ class ContinuumLining(LiningModel):
         The couple per arc of the centre line is what shear and tangential soil springs on the outer face bring, and
         the weight, whose centre lies outside the centre line.
         """
-        ring, theta, span = self.ring, self._theta, self._span
+        ring, theta, span = self.ring, self._theta, 2 * np.pi / len(THETA)
         following = np.roll(np.arange(len(theta)), -1)
         middle = theta + span / 2
-        arc = ring.centre_radius * (span + span[following]) / 2
-        weight = span / (span + span[following])
         shear, moment = fields["shear_force"], fields["bending_moment"]
-        mean_shear = weight * shear + (1 - weight) * shear[:, following]
+        mean_shear = (shear + shear[:, following]) / 2
         samples = np.radians(ordered["theta"].values.astype(float))
         around = np.concatenate([samples - 2 * np.pi, samples, samples + 2 * np.pi])
-        traction = np.stack(
-            [np.interp(middle % (2 * np.pi), around, np.tile(row, 3)) for row in ordered["soil_shear"].values]
-        )
-        column = self.mesh.locate(theta)[0]
+        traction = np.stack([np.interp(middle, around, np.tile(row, 3)) for row in ordered["soil_shear"].values])
+        column = self.mesh.locate(middle)[0]
         share = self.mesh.column_share[column]
-        traction = traction * (weight * share + (1 - weight) * share[following])
+        traction = traction * share
         if ring.ground is not None and ring.ground.slip_at == "outer_face":
             slip = np.stack([self._equilibrium.reactions(row)[0] for row in unknowns])
-            slip = share * slip[:, len(self.mesh.column_lines) :][:, column]
-            traction = traction - weight * slip - (1 - weight) * slip[:, following]
+            traction = traction - share * slip[:, len(self.mesh.column_lines) :][:, column]
         lever = ring.thickness / 2 * ring.outer_radius / ring.centre_radius
         eccentric = ring.concrete_unit_weight * ring.thickness**3 / 12 / ring.centre_radius * np.sin(middle)
+        arc = ring.centre_radius * span
         gap = np.abs(mean_shear + (moment[:, following] - moment) / arc + lever * traction + eccentric)
         if ring.support == "invert":
             # The clamp's own reaction is concentrated there, on both sides of its line.
-            gap[:, np.abs(middle % (2 * np.pi) - np.pi) < 2 * span.max()] = 0
+            gap[:, np.abs(middle % (2 * np.pi) - np.pi) < 2 * span] = 0
         if self.bolts is not None:
-            gap[:, near_anchors(ring, self.bolts, middle, 3 * span.max())] = 0
+            gap[:, near_anchors(ring, self.bolts, middle, 3 * span)] = 0
         return np.nanmax(gap, axis=1)
 
     def _node_share(self):
@@ -359,19 +353,21 @@ class ContinuumLining(LiningModel):
     def _movements(self, displacements):
         """Displacements at the angles of the response, change of the diameters, settlement.
 
-        A ring that nothing holds has no place of its own: its mean movement is taken out.
+        A ring has no place of its own where nothing holds it: that mean movement is taken out.
         """
         sine, cosine = np.sin(self.mesh.node_angle), np.cos(self.mesh.node_angle)
         radial, tangential = displacements[:, 0::2], displacements[:, 1::2]
         right = (radial * sine + tangential * cosine) @ self._share
         up = (radial * cosine - tangential * sine) @ self._share
-        if self.ring.ground is None and self.ring.support == "free":
-            relative = np.empty_like(displacements)
-            relative[:, 0::2] = radial - np.outer(right, sine) - np.outer(up, cosine)
-            turned = tangential - np.outer(right, cosine) + np.outer(up, sine)
-            turn = turned @ self._share / self.ring.centre_radius
-            relative[:, 1::2] = turned - np.outer(turn, self.mesh.node_radius)
-            displacements, up = relative, np.zeros_like(up)
+        sideways, _, turning = borne(self.ring)
+        if not sideways:
+            radial = radial - np.outer(right, sine) - np.outer(up, cosine)
+            tangential = tangential - np.outer(right, cosine) + np.outer(up, sine)
+            up = np.zeros_like(up)
+        if not turning:
+            turn = tangential @ self._share / self.ring.centre_radius
+            tangential = tangential - np.outer(turn, self.mesh.node_radius)
+        displacements = np.stack([radial, tangential], axis=2).reshape(displacements.shape)
         crown, right_waist, invert, left_waist = ((side @ displacements.T).mean(0) for side in self._quarters)
         return {
             "displacement_radial": self._where_solid((self._movement[0] @ displacements.T).T),
@@ -402,18 +398,15 @@ class ContinuumLining(LiningModel):
 
     def _dataset(self, pressures, fields, times):
         joints = np.array(self.ring.joint_angles, dtype=float)
-        centre, half = np.round(np.degrees(self._theta), 10), np.degrees(self._span) / 2
         coordinates = {
             "time": ("time", times),
-            "theta": ("theta", centre),
+            "theta": ("theta", THETA),
             "joint": ("joint", np.arange(1, len(joints) + 1)),
             "joint_angle": ("joint", joints),
         }
         attributes = {"title": "response of the lining: continuum model"} | self._attributes()
         response = response_dataset(fields, coordinates, attributes)
         response["time"].attrs |= pressures["time"].attrs
-        response["theta"].attrs["bounds"] = "theta_bnds"
-        response = response.assign_coords(theta_bnds=(("theta", "bounds"), np.stack([centre - half, centre + half], 1)))
         if "inflow_mass" in pressures:
             response["inflow_mass"] = pressures["inflow_mass"]
         return response

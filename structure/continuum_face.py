@@ -5,15 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from structure.beam_geometry import _periodic_interpolation
+from structure.beam_geometry import arc_pieces, sampled_operator
 from structure.continuum_mesh import EDGE_MEAN, ContinuumMesh
 from structure.continuum_sections import column_means, edge_shapes
 from structure.ring import Ring
-
-#: Gauss points of a piece of the face: exact for linear traction times quadratic shares.
-PIECE_POINTS, PIECE_WEIGHTS = np.polynomial.legendre.leggauss(2)
-#: Longest piece [rad]: half the usual spacing of samples, whose kinks are then met or nearly so.
-LONGEST_PIECE = np.radians(0.5)
 
 
 def traction_operator(ring: Ring, mesh: ContinuumMesh, theta: np.ndarray) -> tuple[sparse.csr_array, sparse.csr_array]:
@@ -31,32 +26,24 @@ def traction_operator(ring: Ring, mesh: ContinuumMesh, theta: np.ndarray) -> tup
         share of it is left out.
     """
     edges = mesh.column_angles()
-    n_unknowns = 2 * mesh.n_lines * mesh.n_levels
     span = edges[:, 2] - edges[:, 0]
-    pieces = int(np.ceil(span.max() / LONGEST_PIECE - 1e-6))
-    place = ((np.arange(pieces)[:, None] + (PIECE_POINTS + 1) / 2) / pieces).ravel()
-    weight = np.tile(PIECE_WEIGHTS / 2, pieces) / pieces
-    angle = edges[:, :1] + span[:, None] * place
-    samples, shares = _periodic_interpolation(theta, angle.ravel())
-    outer = mesh.column_lines * mesh.n_levels + mesh.n_levels - 1
+    column, angle, weight = arc_pieces(edges[:, 0], span, theta)
+    outer = mesh.column_lines[column] * mesh.n_levels + mesh.n_levels - 1
+    shapes = edge_shapes((angle - edges[column, 0]) / span[column])
     # The pressure follows the circle's normal at its own angle, not at the node that takes a share of it.
-    lean = angle[:, :, None] - edges[:, None, :]
-    area = (ring.outer_radius * (mesh.column_share * span)[:, None] * weight)[:, :, None] * edge_shapes(place)
-    parts = {
-        "pressure": (-area * np.cos(lean), -area * np.sin(lean)),
-        "shear": (-area * np.sin(lean), area * np.cos(lean)),
-    }
-    node = np.broadcast_to(outer[:, None, :], area.shape)
-    operators = []
-    for radial, tangential in parts.values():
-        rows = np.concatenate([2 * node.ravel(), 2 * node.ravel() + 1])
-        values = np.concatenate([radial.ravel(), tangential.ravel()])
-        total = sparse.csr_array((n_unknowns, len(theta)))
-        for sample, share in zip(samples, shares, strict=True):
-            columns, shared = np.tile(np.repeat(sample, 3), 2), np.tile(np.repeat(share, 3), 2)
-            total = total + sparse.coo_array((values * shared, (rows, columns)), shape=total.shape)
-        operators.append(total.tocsr())
-    return tuple(operators)
+    lean = angle[:, None] - edges[column]
+    inward = np.stack([-np.cos(lean), -np.sin(lean)], axis=2) * shapes[:, :, None]
+    clockwise = np.stack([-np.sin(lean), np.cos(lean)], axis=2) * shapes[:, :, None]
+    # Shares of a force at nodes on a circle turn like a force within it: the end nodes take the couple that is missing.
+    half = span[column] / 2
+    pair = np.stack([np.cos(half), np.sin(half), np.zeros_like(half), 0 * half, -np.cos(half), np.sin(half)], axis=1)
+    pair = pair.reshape(-1, 3, 2) / (2 * np.sin(half))[:, None, None]
+    inward -= inward[:, :, 1].sum(1)[:, None, None] * pair
+    clockwise += (1 - clockwise[:, :, 1].sum(1))[:, None, None] * pair
+    area = (ring.outer_radius * mesh.column_share[column] * weight)[:, None, None]
+    unknown = 2 * outer[:, :, None] + np.arange(2)
+    n_unknowns = 2 * mesh.n_lines * mesh.n_levels
+    return tuple(sampled_operator(unknown, area * part, theta, angle, n_unknowns) for part in (inward, clockwise))
 
 
 def spring_feelers(ring: Ring, mesh: ContinuumMesh) -> tuple[sparse.csr_array, np.ndarray]:

@@ -22,19 +22,38 @@ def section_forces(
     (r - R).
     """
     across, levers = _section_integrals(mesh, stresses, centre_radius)
-    column, place = mesh.locate(theta)
-    inside = np.flatnonzero(column >= 0)
-    share = (place[inside] - STRESS_POINTS[0]) / (STRESS_POINTS[1] - STRESS_POINTS[0])
-    station = 2 * column[inside]
-    between = sparse.coo_array(
-        (np.concatenate([1 - share, share]), (np.tile(inside, 2), np.concatenate([station, station + 1]))),
-        shape=(len(theta), 2 * len(mesh.column_lines)),
-    ).tocsr()
+    between = _between_stations(mesh, theta)
     return (
         -(between @ across @ stresses.hoop).tocsr(),
         -(between @ across @ stresses.shear).tocsr(),
         (between @ levers @ stresses.hoop).tocsr(),
     )
+
+
+def _between_stations(mesh: ContinuumMesh, theta: np.ndarray) -> sparse.csr_array:
+    """Linear interpolation at theta [rad] between the two stations around it, (n_theta, 2 n_columns).
+
+    They may belong to neighbouring columns, also across a joint, which passes on all forces; not across the opening.
+    """
+    column, place = mesh.locate(theta)
+    inside = np.flatnonzero(column >= 0)
+    column, place = column[inside], place[inside]
+    edges, count = mesh.column_angles(), len(mesh.column_lines)
+    span = edges[:, 2] - edges[:, 0]
+    apart = np.abs((edges[np.arange(1, count + 1) % count, 0] - edges[:, 2] + np.pi) % (2 * np.pi) - np.pi)
+    first, second = 2 * column, 2 * column + 1
+    leads_back = (place < STRESS_POINTS[0]) & (apart[column - 1] < 1e-9)
+    leads_on = (place > STRESS_POINTS[1]) & (apart[column] < 1e-9)
+    first = np.where(leads_back, first - 1, np.where(leads_on, second, first)) % (2 * count)
+    second = np.where(leads_back, 2 * column, np.where(leads_on, second + 1, second)) % (2 * count)
+    station = (edges[:, :1] + span[:, None] * STRESS_POINTS).ravel()
+    gap = (station[second] - station[first]) % (2 * np.pi)
+    here = edges[column, 0] + place * span[column]
+    share = ((here - station[first] + np.pi) % (2 * np.pi) - np.pi) / gap
+    return sparse.coo_array(
+        (np.concatenate([1 - share, share]), (np.tile(inside, 2), np.concatenate([first, second]))),
+        shape=(len(theta), 2 * count),
+    ).tocsr()
 
 
 def _section_integrals(mesh: ContinuumMesh, stresses: StressOperators, centre_radius: float):

@@ -117,6 +117,7 @@ class RingEquilibrium(RingForces):
                 raise NoEquilibrium(
                     f"displacements reach {largest:.3g} m {self.place(worst)}, beyond {self.largest:.3g} m (a tenth of"
                     " the outer radius): the ground cannot carry the loads, or the joints are too weak"
+                    + self.freest_joint(displacement)
                     + self.conditions(displacement, slip)
                 )
         worst = int(np.abs(out_of_balance).argmax()) // 3

@@ -25,6 +25,11 @@ from structure.pressures import PRESSURES, check_pressures
 
 __all__ = ["PRESSURES", "check_pressures"]  # of `structure.pressures`, for models
 
+#: Angles of every response [degree]: those of the pressures of a run, so that the two meet in one expression.
+THETA = np.arange(360.0)
+#: Both sides of an angle [rad]: at a joint the mean of the two is given.
+SIDES = (-1e-9, 1e-9)
+
 #: name: (dimensions, units, long name)
 RESPONSE = {
     "axial_force": (("time", "theta"), "N m-1", "axial force per metre of tunnel, compression positive"),
@@ -48,10 +53,15 @@ RESPONSE = {
     "spring_sum_horizontal": (("time",), "N m-1", "horizontal sum of soil springs and support, right positive"),
     "spring_sum_vertical": (("time",), "N m-1", "vertical sum of soil springs and support, up positive"),
     "balanced_uplift": (("time",), "N m-1", "vertical sum of pressures and weight balanced by radial soil pressure"),
+    "unborne_resultant": (
+        ("time",),
+        "1",
+        "force or torque that nothing bears, taken out evenly, over the sum of loads",
+    ),
 }
 
 #: Variables of a response that are no state of the ring: their change since the first record says nothing.
-NOT_ADDITIONAL = ("equilibrium_residual", "shear_moment_residual", "inflow_mass")
+NOT_ADDITIONAL = ("equilibrium_residual", "shear_moment_residual", "unborne_resultant", "inflow_mass")
 
 #: name: (units, long name)
 COORDINATES = {
@@ -92,7 +102,8 @@ class LiningModel(ABC):
         Returns
         -------
         xarray.Dataset
-            The variables of :data:`RESPONSE`, with ``inflow_mass`` (time) carried along where it is given.
+            The variables of :data:`RESPONSE` at :data:`THETA`, with ``inflow_mass`` (time) carried along where it is
+            given.
 
         Raises
         ------
@@ -119,6 +130,34 @@ def response_dataset(
         units, long_name = COORDINATES[name]
         axes[name] = (dimension, values, {"units": units, "long_name": long_name})
     return xr.Dataset(variables, coords=axes, attrs=attributes)
+
+
+def at_whole_degrees(dataset: xr.Dataset, along: str = "theta") -> xr.Dataset:
+    """A response at :data:`THETA`, linear between its own angles: of another model, or of an earlier version's file.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        What is at these angles already is given back as it is.
+    along : str
+        Its dimension around the ring [degree], ascending; becomes ``theta``.
+    """
+    if along not in dataset.dims or (along == "theta" and np.array_equal(dataset["theta"], THETA)):
+        return dataset
+    names = [name for name, variable in dataset.data_vars.items() if along in variable.dims and name != "theta_bnds"]
+    around = dataset[names]
+    around = around.drop_vars([name for name in around.coords if along in around[name].dims and name != along])
+    last, first = around.isel({along: [-1]}), around.isel({along: [0]})
+    last, first = last.assign_coords({along: last[along] - 360}), first.assign_coords({along: first[along] + 360})
+    moved = xr.concat([last, around, first], dim=along).interp({along: THETA})
+    if along != "theta":
+        moved = moved.rename({along: "theta"})
+    units, long_name = COORDINATES["theta"]
+    moved["theta"].attrs = {"units": units, "long_name": long_name}
+    rest = dataset.drop_dims(along)
+    if "theta" in rest.coords:
+        moved = moved.drop_vars("theta")
+    return rest.assign(moved)
 
 
 def additional(response: xr.Dataset) -> xr.Dataset:

@@ -123,15 +123,18 @@ class RingForces:
         return f"at {np.degrees(self.mesh.node_angle[node]) % 360:.4g} degrees"
 
     def loose_place(self, motion: np.ndarray) -> str:
-        message = "the ring is a mechanism: joints too weak to hold it without more ground"
+        return "the ring is a mechanism: joints too weak to hold it without more ground" + self.freest_joint(motion)
+
+    def freest_joint(self, motion: np.ndarray) -> str:
+        """Which joint moves most in a motion and how, for the message of a failure."""
         if not len(self.joint_unknowns) or not np.isfinite(motion).all():
-            return message
+            return ""
         jumps = np.abs(motion[self.joint_unknowns] @ self.jumps.T) * [1, 1, self.ring.centre_radius]
         joint, way = np.unravel_index(int(jumps.argmax()), jumps.shape)
         if jumps[joint, way] < 1e-3 * np.abs(motion).max():
-            return message + "; it moves as a whole"
-        verb = ("opens", "slides", "turns")[way]
-        return message + f"; joint {joint + 1} ({self.ring.joint_angles[joint]:g} degrees) {verb} most freely"
+            return "; it moves as a whole"
+        verb = ("opens or closes", "slides", "turns")[way]
+        return f"; joint {joint + 1} ({self.ring.joint_angles[joint]:g} degrees) {verb} most freely"
 
     def conditions(self, displacement: np.ndarray, slip: np.ndarray) -> str:
         """Joints that are not closed and how much of the ring the ground presses on, for the message of a failure."""

@@ -37,11 +37,12 @@ def limit_pressures(ground: Ground) -> tuple[float, float]:
     """Limit reaction of the soil, normal and tangential to the lining [Pa].
 
     p_n = 2 c cos(phi)/(1 - sin(phi)) + (1 + sin(phi))/(1 - sin(phi)) ds,  ds = (s_h + s_v)/2 nu/(1 - nu);
-    p_t = (s_h + s_v)/2 tan(phi).
+    p_t = c + (s_h + s_v)/2 tan(phi).
 
     Source: Do et al. (2014), hyperstatic reaction method, *as usually quoted*. The primary source could not be opened
     to check it, so limits measured or agreed for a site belong into ``Ground.limit_pressure_normal`` and
-    ``Ground.limit_pressure_tangential``, which win.
+    ``Ground.limit_pressure_tangential``, which win. The quoted p_t is its second term alone, that of sand; soil shears
+    along the lining at Coulomb's c + sigma tan(phi), and undrained clay (phi = 0) holds on to it by cohesion only.
 
     Examples
     --------
@@ -55,7 +56,7 @@ def limit_pressures(ground: Ground) -> tuple[float, float]:
     mean_stress = (ground.horizontal_stress + ground.vertical_stress) / 2
     confinement = mean_stress * ground.poissons_ratio / (1 - ground.poissons_ratio)
     normal = (2 * ground.cohesion * cos_phi + (1 + sin_phi) * confinement) / (1 - sin_phi)
-    tangential = mean_stress * sin_phi / cos_phi
+    tangential = ground.cohesion + mean_stress * sin_phi / cos_phi
     if ground.limit_pressure_normal is not None:
         normal = ground.limit_pressure_normal
     if ground.limit_pressure_tangential is not None:

@@ -94,7 +94,7 @@ def soil(**values):
     [
         (soil(youngs_modulus=4e4), ["soils[0].youngs_modulus", "40000 kPa", "write 4e+07"]),
         (soil(cohesion=5.0), ["soils[0].cohesion", "5 kPa", "write 5000"]),
-        (soil(friction_angle=0.436), ["soils[0].friction_angle", "0.436 rad", "write 24.98"]),
+        (soil(friction_angle=0.436, k0=1.0), ["soils[0].friction_angle", "0.436 rad", "write 24.98"]),
         (soil(hydraulic_conductivity=8.64), ["hydraulic_conductivity", "8.64 m/day", "write 0.0001"]),
         ({"water": {"bulk_modulus": 2.2e6}}, ["water.bulk_modulus", "kPa", "write 2.2e+09"]),
         ({"gate": {"angle": 1.5708}}, ["gate.angle", "radians", "write 90"]),
@@ -114,6 +114,7 @@ def test_wrong_order_of_magnitude_is_warned_of_once_with_what_to_write(changes, 
     [
         (soil(porosity=45), ["fraction, not percent", "write 0.45"]),
         (soil(grain_density=2.65), ["2.65 t/m3", "write 2650"]),
+        (soil(friction_angle=0.436), ["k0 must lie in", "soils[0].friction_angle", "0.436 rad", "write 24.98"]),
         ({"gate": {"width": 200.0}}, ["200 mm", "write 0.2"]),
     ],
 )

@@ -16,6 +16,7 @@ import coupling
 import mpm
 from coupling import datasets
 from coupling.cli import ProgressLine, app
+from coupling.figures import draw_run
 from coupling.plan import features
 from coupling.run import check_memory, run
 from coupling.run_folder import RunRefused, claimed, default_folder
@@ -103,6 +104,23 @@ def test_values_of_the_scene_are_set_on_the_command_line(simulated, tmp_path):
     assert refused.exit_code == 2 and "did you mean 'angle'" in refused.output and not (tmp_path / "b").exists()
     resumed = gush("run", "--resume", "--out", tmp_path / "a", "--set", "gate.angle=50")
     assert resumed.exit_code == 2 and "--set" in resumed.output
+
+
+def test_ring_that_fails_leaves_the_pictures_of_the_ground_and_says_what_failed(simulated, tmp_path):
+    (tmp_path / "loose.toml").write_text(
+        'base = "quick"\n[ring]\njoint_rotational_stiffness = 0.0\njoint_normal_stiffness = 0.0\n'
+        "joint_shear_stiffness = 0.0\n"
+    )
+    result = gush("run", tmp_path / "loose.toml", "--out", tmp_path / "a")
+    assert result.exit_code == 3
+    assert "ring: no equilibrium" in result.output and "the ground is computed and drawn" in result.output
+    assert "ring: no equilibrium" in (tmp_path / "a" / "run.log").read_text()
+    whole = gush("run", "quick", "--out", tmp_path / "b", "--no-figures")
+    assert whole.exit_code == 0
+    drawn, of_ground = (sorted(path.name for path in place) for place in (
+        (tmp_path / "a" / "figures").iterdir(), draw_run(tmp_path / "b", tmp_path / "b" / "figures")))  # fmt: skip
+    assert drawn == of_ground and len(drawn) > 3
+    assert coupling.read_run(tmp_path / "a").attrs["status"] == "finished"
 
 
 def test_scene_file_of_a_run_gives_the_same_scene(simulated, tmp_path):

@@ -86,9 +86,8 @@ def largest_differences(lining, changes_of=None, loads=None):
     if lining.ground is not None:
         # some springs press and some are open, or the comparison would say nothing about them
         assert response["displacement_radial"].min() < 0 < response["displacement_radial"].max()
-    order = np.argsort(np.degrees(model.mesh.mid_angle) % 360)
     pairs = {
-        name: (response[name].values, peer["forces"][order, column])
+        name: (response[name].values, model._forces_at @ peer["forces"][:, column])
         for column, name in enumerate(("axial_force", "shear_force", "bending_moment"))
     }
     for kind, names in (
@@ -99,13 +98,9 @@ def largest_differences(lining, changes_of=None, loads=None):
             if len(lining.joint_angles):
                 pairs[name] = (response[name].values, peer[kind][:, column])
     if lining.ground is not None:
-        radial = peer["displacement"][:, 0]
+        radial = model._movement[0] @ peer["displacement"].ravel()
         ours = np.stack([response[f"convergence_{way}"].values for way in ("vertical", "horizontal")])
-        theirs = [
-            -(model._radial_at(radial[None], a) + model._radial_at(radial[None], a + np.pi))[0]
-            for a in (0.0, np.pi / 2)
-        ]
-        pairs["convergence"] = (ours, np.array(theirs))
+        pairs["convergence"] = (ours, -(radial[[0, 90]] + radial[[180, 270]]))
     return {name: np.abs(one - other).max() / np.abs(other).max() for name, (one, other) in pairs.items()}
 
 

@@ -58,7 +58,7 @@ def test_numbers_on_the_page_are_those_of_the_datasets(rehearsal):
     moment = study["joint_bending_moment"].isel(case=0, progress=0, model=0).values / 1e3
     ours = {row["statement"]: row["ours"] for row in data["answers"]}
     assert ours["initial M, joint 2 [kN m/m]"] == f"{moment[1]:.0f}"
-    largest = study["bending_moment"].isel(case=0, model=0).max("theta_ring")
+    largest = study["bending_moment"].isel(case=0, model=0).max("theta")
     change = 100 * float(largest.interp(progress=0.5) / largest.isel(progress=0)) - 100
     # the page takes the state of the run, the study that between two of its five: equal at half of the last inflow
     assert float(re.match(r"[+-]\d+", ours["largest positive moment [%]"])[0]) == pytest.approx(change, abs=1.0)
@@ -130,9 +130,9 @@ def sensitivity_data():
 
     mass, progress = np.linspace(0.0, 100.0, 11), np.linspace(0.0, 1.0, 11)
     time = np.stack([mass / 50, mass / 25, np.nan * mass])
-    theta, ring, joint = np.arange(0.0, 360.0, 90.0), np.arange(0.5, 360.0, 90.0), np.arange(1, 7)
+    theta, joint = np.arange(0.0, 360.0, 90.0), np.arange(1, 7)
     ones = np.ones((3, 11))[..., None]
-    forces = {name: (("case", "progress", "model", "theta_ring"), ones[..., None] * np.ones(4) * 1e3)
+    forces = {name: (("case", "progress", "model", "theta"), ones[..., None] * np.ones(4) * 1e3)
               for name in ("axial_force", "shear_force", "bending_moment")}  # fmt: skip
     return xr.Dataset(
         {
@@ -144,7 +144,7 @@ def sensitivity_data():
         },
         coords={
             "case": [0, 1, 2], "progress": progress, "inflow_mass": (("case", "progress"), np.tile(mass, (3, 1))),
-            "theta": theta, "theta_ring": ring, "joint": joint, "model": ["beam-spring"],
+            "theta": theta, "joint": joint, "model": ["beam-spring"],
             "soils_0_k": ("case", [2.0, 1.0, 0.5]),
         },
         attrs={"study": json.dumps({"parameters": {"soils.0.k": [1.0, 0.5]}})},

@@ -1,6 +1,7 @@
 """Bad input gets one clear message (rule, name, value, remedy); good input is kept exactly."""
 
 import math
+import re
 
 import pytest
 from pydantic import ValidationError
@@ -319,3 +320,41 @@ def test_changes_of_the_command_line_are_read_as_a_scene_says_them():
     for text in ("gate.angle", "=45", "gate.angle="):
         with pytest.raises(SceneError, match="must be NAME=VALUE"):
             parse_changes([text])
+
+
+def with_soil(**values):
+    return coupling.load_scene("quick", **edited("quick", "soils", **values)).mpm
+
+
+@pytest.mark.parametrize(("k0", "borne"), [(0.405, False), (0.406, True), (1.0, True), (2.463, True), (2.465, False)])
+def test_k0_is_one_that_friction_bears(k0, borne):
+    # phi = 25: (1 - sin)/(1 + sin) = 0.4059, (1 + sin)/(1 - sin) = 2.4639
+    if borne:
+        assert with_soil(k0=k0).soils[0].k0 == k0
+        return
+    with pytest.raises(coupling.SceneError, match=r"soil 'sand': k0 must lie in 0\.406 \.\. 2\.464.* got .*; give"):
+        with_soil(k0=k0)
+
+
+def test_k0_that_cohesion_bears_near_the_surface_only_is_refused_with_the_depth():
+    # undrained clay: s_v - s_h = 2 c; (1 - 0.5) s_v reaches 2 * 20 kPa at s_v = 80 kPa
+    clay = dict(friction_angle=0.0, dilatancy_angle=0.0, cohesion=20e3, k0=0.5)
+    buoyant = 9.81 * 0.55 * 1650
+    with pytest.raises(coupling.SceneError, match="yields from a depth of") as refusal:
+        with_soil(**clay)
+    depth = float(re.search(r"from a depth of (\S+) m", str(refusal.value))[1])
+    # 1 %: printed with three digits
+    assert depth == pytest.approx(80e3 / buoyant, rel=0.01)
+    least = 1 - 2 * 20e3 / (buoyant * 50.0)
+    assert f"k0 must lie in {least:.3f} .. {2 - least:.3f}" in str(refusal.value)
+    assert with_soil(**clay | dict(cohesion=0.25 * buoyant * 50.0 + 1.0)).soils[0].k0 == 0.5
+    # elastic ground bears any
+    assert with_soil(k0=0.05, model="elastic").soils[0].k0 == 0.05
+
+
+@pytest.mark.parametrize("name", coupling.scene_names())
+def test_built_in_scene_begins_with_a_stress_that_its_soils_bear(name):
+    scene = coupling.load_scene(name).mpm
+    for soil in scene.soils:
+        lowest, highest = soil.admissible_k0(scene.vertical_stress(scene.box.depth))
+        assert lowest < soil.k0 < highest

@@ -327,7 +327,7 @@ def test_one_real_case_with_both_models(tmp_path):
     data = coupling.study(plan, tmp_path, workers=0)
     assert data["status"].values.tolist() == ["finished"]
     moment = data["bending_moment"].isel(case=0, progress=0)
-    assert moment.dims == ("model", "theta_ring") and moment.sizes == {"model": 2, "theta_ring": 360}
+    assert moment.dims == ("model", "theta") and moment.sizes == {"model": 2, "theta": 360}
     beam, continuum = moment.sel(model="beam-spring"), moment.sel(model="continuum")
     assert float(abs(beam - continuum).max()) < 0.05 * float(abs(beam).max())
     assert np.isnan(data["soil_pressure"].isel(case=0, progress=1)).all()  # 1 kg/m is not reached in 4 ms

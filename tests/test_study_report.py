@@ -63,12 +63,10 @@ def test_curves_are_within_half_a_level_and_series_equal_the_dataset(collected, 
         for k, model in enumerate(case["models"]):
             moment = one["bending_moment"].isel(model=k)
             found = unpacked(model["extremes"]["bending_moment_max"])
-            np.testing.assert_array_equal(found, moment.max("theta_ring").values.astype("f4"))
+            np.testing.assert_array_equal(found, moment.max("theta").values.astype("f4"))
             at = unpacked(model["extremes"]["bending_moment_max_angle"])
             reached = np.isfinite(found)
-            np.testing.assert_array_equal(
-                moment.sel(theta_ring=at[reached]).values.diagonal().astype("f4"), found[reached]
-            )
+            np.testing.assert_array_equal(moment.sel(theta=at[reached]).values.diagonal().astype("f4"), found[reached])
 
 
 def test_a_case_that_ended_early_and_a_ring_out_of_balance_are_warned_of(folder, study):
@@ -267,7 +265,7 @@ def test_unrolled_curves_lie_where_their_axes_say(opened, study, against):
             one = study[name].sel(case=case)
             one = one.isel(model=0) if "model" in one.dims else one
             values = (one.isel(progress=2) - (one.isel(progress=0) if against == "change" else 0.0)).values / 1e3
-            angles = study["theta" if "pressure" in name else "theta_ring"].values
+            angles = study["theta"].values
             # labels stand four units below their line
             slope, offset = np.polyfit(y_axis[:, 1] - 4, y_axis[:, 0], 1)
             np.testing.assert_allclose(np.interp(xy[:, 0], x_axis[:, 1], x_axis[:, 0]), angles, atol=0.02)
@@ -308,7 +306,7 @@ def test_boxes_choose_the_cases_by_key_too(opened):
 def test_headings_sort_the_tables(opened, study):
     order = "[...document.querySelectorAll('#{} tbody tr')].map(r => r.cells[0].dataset.value)"
     head = "[...document.querySelectorAll('#{} thead th')].find(h => h.innerText.startsWith('{}'))"
-    largest = study["bending_moment"].isel(model=0).max("theta_ring").values
+    largest = study["bending_moment"].isel(model=0).max("theta").values
     reached = {0: largest[0, 4], 1: largest[1, 4], 2: largest[2, 2]}
     ascending = [str(k) for k in sorted(reached, key=reached.get)]
     for expected, sort in ((ascending, "ascending"), (ascending[::-1], "descending")):

@@ -13,7 +13,7 @@ def extremes(dataset, names=("axial_force", "shear_force", "bending_moment"), al
     names : sequence of str
         Variables with the dimension `along`.
     along : str
-        "theta" [degree]; "theta_ring" in the dataset of a study, "joint" for joints.
+        "theta" [degree], or "joint" for joints.
 
     Returns
     -------

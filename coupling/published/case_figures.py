@@ -42,21 +42,21 @@ def additional_forces(study, inflow_mass, name, title, model="beam-spring"):
     """
     one = study.sel(model=model)
     added = (at_study_inflow(one, inflow_mass)[name] - one[name].isel(progress=0, drop=True)) / 1e3
-    return _polar(study, {title: (study["theta_ring"].values, added)}, f"at {inflow_mass:.0f} kg/m, {model}")
+    return _polar(study, {title: (study["theta"].values, added)}, f"at {inflow_mass:.0f} kg/m, {model}")
 
 
 def deformation(study, inflow_mass, model="beam-spring"):
     """Additional deformation of the ring, without its motion as a whole, and its displacement (figure 22)."""
     one = study.sel(model=model)
     now, first = at_study_inflow(one, inflow_mass), one.isel(progress=0, drop=True)
-    angle = np.radians(study["theta_ring"].values)
+    angle = np.radians(study["theta"].values)
     radial = 1e3 * (now["displacement_radial"] - first["displacement_radial"])
     tangential = 1e3 * (now["displacement_tangential"] - first["displacement_tangential"])
     shape = radial.copy(data=np.stack([
         _centred(angle, r, t)[0] for r, t in zip(radial.values, tangential.values, strict=True)
     ]))  # fmt: skip
     figure = _polar(
-        study, {"additional radial deformation [mm]": (study["theta_ring"].values, shape)},
+        study, {"additional radial deformation [mm]": (study["theta"].values, shape)},
         f"at {inflow_mass:.0f} kg/m, {model}", extra_rows=1,
     )  # fmt: skip
     bars = {

@@ -20,7 +20,7 @@ class RingComparison {
   constructor(key) {
     this.key = key;
     [this.unit, this.factor] = QUANTITIES[key];
-    this.angles = PRESSURES.includes(key) ? data.theta : data.theta_ring;
+    this.angles = data.theta;
   }
   rows(one) { return PRESSURES.includes(this.key) ? one.pressures[this.key] : one.models[model].forces[this.key]; }
   row(one, curve) {

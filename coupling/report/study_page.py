@@ -20,6 +20,7 @@ from coupling.studies.case import RUN_FOLDER
 from coupling.studies.collect import stored_cases, unreadable
 from coupling.studies.design import Range, StudyError, value_text
 from coupling.studies.execute import case_file
+from structure.lining import at_whole_degrees
 from structure.models import model_name
 
 SCRIPTS = (
@@ -77,7 +78,7 @@ def collect(folder, beside, model=None):
     shown = {case.index: whole[case.index].isel(progress=kept) for case in chosen}
     extremes = {k: [{key: v[kept] for key, v in model.items()} for model in extremes[k]] for k in shown}
     # of a case with a ring, if there is one
-    widest = max(shown.values(), key=lambda one: one.sizes.get("theta_ring", 0), default=None)
+    widest = max(shown.values(), key=lambda one: one.sizes.get("model", 0), default=None)
     step, records = (1, kept) if widest is None else budget(widest, len(chosen))
     return {
         "name": plan.name,
@@ -98,7 +99,6 @@ def _player(dataset, whole, extremes, chosen, rows, step, records):
         "stops": packed(slider_stops([whole[case.index] for case in chosen], records)),
         "records": records.tolist(),
         "theta": dataset["theta"].values[::step].tolist(),
-        "theta_ring": dataset["theta_ring"].values[::step].tolist() if "theta_ring" in dataset.dims else [],
         "models": [str(name) for name in dataset["model"].values] if "model" in dataset.dims else [],
         "cases": [
             {
@@ -115,7 +115,7 @@ def _player(dataset, whole, extremes, chosen, rows, step, records):
 def _loaded(file, models):
     """The dataset of a case, in memory, with these lining models in their order."""
     try:
-        dataset = read_group_at_once(file)
+        dataset = at_whole_degrees(read_group_at_once(file), "theta_ring")
         same = "model" not in dataset.dims or tuple(dataset["model"].values) == tuple(models)
         return dataset if same else dataset.reindex(model=list(models))
     except (OSError, RuntimeError, ValueError, KeyError, AttributeError) as error:

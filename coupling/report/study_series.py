@@ -28,8 +28,7 @@ def budget(dataset, count):
         Every how many values around the ring are taken, and at which of the inflow masses.
     """
     records = dataset.sizes["progress"]
-    curves = len(PRESSURES) * dataset.sizes["theta"]
-    curves += len(FORCES) * dataset.sizes.get("theta_ring", 0) * dataset.sizes.get("model", 0)
+    curves = (len(PRESSURES) + len(FORCES) * dataset.sizes.get("model", 0)) * dataset.sizes["theta"]
     most = BYTES_OF_CURVES / (BYTES_OF_VALUE * curves * max(count, 1))  # records of whole curves
     step = next((step for step in ANGLE_STEPS if most * step >= records), ANGLE_STEPS[-1])
     return step, evenly(records, max(2, int(most * step)))
@@ -104,7 +103,7 @@ def ring_extremes_over_mass(dataset):
 
 
 def _extremes_of(model):
-    found = _around(model, FORCES, "theta_ring")
+    found = _around(model, FORCES, "theta")
     if model.sizes.get("joint"):
         found["joint_opening_max"] = model["joint_opening"].max("joint").values
         found["joint_rotation_max"] = abs(model["joint_rotation"]).max("joint").values

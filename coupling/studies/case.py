@@ -100,7 +100,7 @@ def at_inflow_masses(pressures, history, responses, masses):
     -------
     xarray.Dataset
         Pressures (progress, theta); time, zones and so on (progress); variables of the responses with a dimension
-        `model`, angles as `theta_ring`; `inflow_mass` (progress) [kg/m]; progress from 0 to 1 is the share of the last
+        `model`; `inflow_mass` (progress) [kg/m]; progress from 0 to 1 is the share of the last
         inflow mass, so that cases of different stops stack. cpu_seconds, quality numbers as scalars.
     """
     import xarray as xr
@@ -112,9 +112,8 @@ def at_inflow_masses(pressures, history, responses, masses):
     parts = [_at(pressures[["soil_pressure", "water_pressure", "soil_shear"]], reached)]
     parts.append(_at(history[[name for name in PROGRESS if name != "time" and name in history]], reached))
     if responses:
-        keep = [name for name in next(iter(responses.values())).data_vars if name not in ("inflow_mass", "theta_bnds")]
-        # pressures are means over whole degrees, section forces belong to the beams between them
-        models = [_at(response[keep], reached).rename(theta="theta_ring") for response in responses.values()]
+        keep = [name for name in next(iter(responses.values())).data_vars if name != "inflow_mass"]
+        models = [_at(response[keep], reached) for response in responses.values()]
         parts.append(xr.concat(models, dim=xr.IndexVariable("model", list(responses)), join="outer"))
     result = xr.merge(parts, compat="no_conflicts", join="outer")
     result["time"] = (

@@ -36,6 +36,7 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     import xarray as xr
 
     from coupling.studies.execute import case_file
+    from structure.lining import at_whole_degrees
 
     there = [case for case in cases if case_file(folder, case).is_file()]
     parts, files = [], [case_file(folder, case) for case in there]
@@ -43,9 +44,10 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     for file in files:
         try:
             if small:
-                parts.append(read_group_at_once(file))
+                part = read_group_at_once(file)
             else:
-                parts.append(xr.open_dataset(file, engine="h5netcdf", chunks={}, decode_timedelta=False))
+                part = xr.open_dataset(file, engine="h5netcdf", chunks={}, decode_timedelta=False)
+            parts.append(at_whole_degrees(part, "theta_ring"))  # as earlier versions called the angles of the ring
         except (OSError, RuntimeError, ValueError, KeyError, AttributeError) as error:
             raise StudyError(unreadable(file, error)) from None
     if parts:

@@ -24,7 +24,7 @@ def sensitivity(study, quantity):
     study : xarray.Dataset
         Of :func:`coupling.study`.
     quantity : xarray.DataArray
-        (case), for instance ``study.bending_moment.sel(model="beam-spring").isel(progress=-1).max("theta_ring")``.
+        (case), for instance ``study.bending_moment.sel(model="beam-spring").isel(progress=-1).max("theta")``.
 
     Returns
     -------

@@ -1,0 +1,239 @@
+"""Rings of any joints and springs under loads in balance: solved, or refused with a reason that holds."""
+
+import re
+from functools import cache
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from structure import BeamSpringLining, ContinuumLining, Ground, LiningFailure, Ring, theory
+
+RADIUS = 3.3
+LINING = dict(outer_diameter=6.6, inner_diameter=5.9, concrete_modulus=34.5e9, concrete_poissons_ratio=0.2)
+SOIL = dict(youngs_modulus=40e6, poissons_ratio=0.3, cohesion=0.0, friction_angle=25.0, vertical_stress=2.07e5,
+            horizontal_stress=8.9e4)  # fmt: skip
+ORDINARY = dict(joint_rotational_stiffness=5e8, joint_normal_stiffness=6e8, joint_shear_stiffness=8e7)
+#: What each kind of soil spring is called with.
+SPRINGS = {
+    "none": None,
+    "radial, pressing only": dict(tangential_springs=False),
+    "radial, two-way": dict(tangential_springs=False, two_way=True),
+    "hyperbolic": {},
+    "linear": dict(law="linear"),
+    "at the centre line": dict(slip_at="centre_line"),
+}
+#: How the joint that moves most moves, and the stiffness that it lacks.
+WAYS = {"turns": "joint_rotational_stiffness", "slides": "joint_shear_stiffness",
+        "opens or closes": "joint_normal_stiffness"}  # fmt: skip
+
+
+def random_angles(rng):
+    """3 to 12 joints at least 4 degrees apart."""
+    count = rng.integers(3, 13)
+    while True:
+        angles = np.sort(rng.uniform(0, 360, count))
+        if np.diff(angles, append=angles[0] + 360).min() > 4:
+            return tuple(angles)
+
+
+def random_ring(rng, springs):
+    def stiffness(low, high, none):
+        return 0.0 if rng.random() < none else 10 ** rng.uniform(low, high)
+
+    ground = None
+    if springs is not None:
+        ground = Ground(
+            youngs_modulus=10 ** rng.uniform(6.5, 8.3),
+            poissons_ratio=rng.uniform(0, 0.45),
+            cohesion=rng.choice([0.0, 10 ** rng.uniform(3, 5)]),
+            friction_angle=rng.choice([0.0, rng.uniform(5, 45)]),
+            vertical_stress=2e5,
+            horizontal_stress=rng.uniform(0.3, 1.2) * 2e5,
+            **springs,
+        )
+    return Ring(
+        **LINING,
+        concrete_unit_weight=rng.choice([0.0, 25e3]),
+        joint_angles=random_angles(rng),
+        joint_rotational_stiffness=stiffness(6.5, 10, 0.15),
+        joint_normal_stiffness=stiffness(7, 11, 0.05),
+        joint_shear_stiffness=stiffness(7, 10, 0.05),
+        ground=ground,
+        balance_uplift=True,
+    )
+
+
+def integral(theta, values, factor):
+    """Of values at angles [rad], linear between them, times a function of the angle: 8 Gauss points between samples."""
+    length = np.diff(theta, append=theta[0] + 2 * np.pi)
+    points, weights = np.polynomial.legendre.leggauss(8)
+    share = (points + 1) / 2
+    between = values[:, None] * (1 - share) + np.roll(values, -1)[:, None] * share
+    return (length[:, None] * weights / 2 * between * factor(theta[:, None] + length[:, None] * share)).sum()
+
+
+def sums(theta, pressure, shear):
+    """Force to the right and up, and torque over the radius, over the radius [Pa]."""
+    one = np.ones_like
+    return np.array(
+        [
+            integral(theta, shear, np.cos) - integral(theta, pressure, np.sin),
+            -integral(theta, shear, np.sin) - integral(theta, pressure, np.cos),
+            integral(theta, shear, one),
+        ]
+    )
+
+
+def random_balanced_loads(rng):
+    """Pressures and shear of random harmonics at random angles, without resultants."""
+    count = int(rng.integers(24, 400))
+    degrees = np.unique(rng.uniform(0, 360, count)) if rng.random() < 0.5 else np.arange(count) * 360 / count
+    theta = np.radians(degrees)
+    mean = rng.uniform(1e5, 5e5)
+    size = rng.uniform(0, 0.15) * mean
+
+    def harmonics(first):
+        return sum(size / k * rng.normal() * np.cos(k * theta + rng.uniform(0, 2 * np.pi)) for k in range(first, 7))
+
+    traction = np.stack([mean + harmonics(2), 0.3 * harmonics(1)])
+    zero = np.zeros_like(theta)
+    basis = np.array([(np.sin(theta), zero), (np.cos(theta), zero), (zero, zero + 1)])
+    of_basis = np.stack([sums(theta, *each) for each in basis], axis=1)
+    traction -= np.tensordot(np.linalg.solve(of_basis, sums(theta, *traction)), basis, 1)
+    return loads_of(degrees, *traction)
+
+
+def loads_of(degrees, pressure, shear):
+    parts = {"soil_pressure": 0.6 * pressure, "water_pressure": 0.4 * pressure, "soil_shear": shear}
+    return xr.Dataset(
+        {name: (("time", "theta"), values[None]) for name, values in parts.items()},
+        coords={"time": [0.0], "theta": degrees},
+    )
+
+
+def outcome(model, ring, loads):
+    """The response, or the reason of the refusal in words."""
+    try:
+        return model(ring).respond(loads).isel(time=0)
+    except LiningFailure as refusal:
+        return str(refusal)
+
+
+@cache
+def cases():
+    """200 rings with their loads, and what the ring of beams makes of them."""
+    rng = np.random.default_rng(20261128)
+    kinds = list(SPRINGS.values())
+    made = [(random_ring(rng, kinds[k % len(kinds)]), random_balanced_loads(rng)) for k in range(200)]
+    return [(ring, loads, outcome(BeamSpringLining, ring, loads)) for ring, loads in made]
+
+
+def test_random_ring_is_refused_only_where_a_joint_without_stiffness_gives_way():
+    refused = [(ring, loads, answer) for ring, loads, answer in cases() if isinstance(answer, str)]
+    for ring, loads, reason in refused:
+        way = re.search(r"degrees\) (turns|slides|opens or closes) most freely", reason)[1]
+        assert getattr(ring, WAYS[way]) == 0, reason
+        stiffer = ring.model_copy(update={name: max(getattr(ring, name), ORDINARY[name]) for name in WAYS.values()})
+        assert not isinstance(outcome(BeamSpringLining, stiffer, loads), str), reason
+    assert 0 < len(refused) < len(cases()) / 4
+
+
+def test_random_ring_alone_is_refused_exactly_where_it_has_more_releases_than_redundants():
+    alone = [(ring, answer) for ring, _, answer in cases() if ring.ground is None]
+    for ring, answer in alone:
+        releases = sum(getattr(ring, name) == 0 for name in WAYS.values()) * len(ring.joint_angles)
+        assert isinstance(answer, str) == (releases > 3), answer
+        assert releases <= 3 or "mechanism" in answer
+    assert any(isinstance(answer, str) for _, answer in alone)
+
+
+def test_random_ring_is_in_equilibrium_under_all_of_its_loads():
+    solved = [answer for *_, answer in cases() if not isinstance(answer, str)]
+    # 1e-8 of the loads is asked for everywhere; what is taken out is the rounding of loads balanced to 1e-16.
+    assert max(answer["equilibrium_residual"].item() for answer in solved) < 1e-8
+    assert max(answer["unborne_resultant"].item() for answer in solved) < 1e-12
+
+
+def test_both_models_solve_and_refuse_the_same_random_rings():
+    for ring, loads, beams in cases()[:30]:
+        continuum = outcome(ContinuumLining, ring, loads)
+        assert isinstance(beams, str) == isinstance(continuum, str), (beams, continuum)
+        if isinstance(beams, str):
+            continue
+        assert continuum["equilibrium_residual"] < 1e-8
+        # 2 % of the mean N: both turn the same pressures on the outer face into thrust
+        thrusts = [answer["axial_force"].mean().item() for answer in (continuum, beams)]
+        assert thrusts[0] == pytest.approx(thrusts[1], rel=0.02)
+
+
+THEORY = theory.theoretical_pressures(
+    outer_diameter=6.6, cover=20.0, buoyant_unit_weight=8900.0, coefficient_at_rest=3 / 7
+)
+
+
+def without_tangential_springs(angles, **soil):
+    ground = Ground(**(SOIL | dict(tangential_springs=False) | soil))
+    return Ring(**LINING, **ORDINARY, concrete_unit_weight=25e3, joint_angles=angles, ground=ground,
+                balance_uplift=True)  # fmt: skip
+
+
+@pytest.mark.parametrize(("model", "count"), [(BeamSpringLining, 40), (ContinuumLining, 5)])
+def test_ring_without_tangential_springs_is_solved_whatever_the_angles_of_its_joints(model, count):
+    rng = np.random.default_rng(1)
+    for _ in range(count):
+        response = model(without_tangential_springs(random_angles(rng))).respond(THEORY).isel(time=0)
+        assert response["equilibrium_residual"] < 1e-8
+        # mirrored pressures and weight have no torque; what the quadrature leaves is rounding
+        assert response["unborne_resultant"] < 1e-12
+
+
+@pytest.mark.parametrize("model", [BeamSpringLining, ContinuumLining])
+@pytest.mark.parametrize("soil", [{}, dict(tangential_springs=True, limit_pressure_tangential=0.0)])
+def test_small_torque_that_nothing_bears_is_taken_out_evenly_and_reported(model, soil):
+    ring = without_tangential_springs((20.0, 110.0, 170.0, 260.0, 333.0), **soil)
+    twisted = THEORY.assign(soil_shear=THEORY["soil_shear"] + 0.1)
+    given, straight = (model(ring).respond(loads).isel(time=0) for loads in (twisted, THEORY))
+    # torque over the centre line's radius, over the sum of all nodal loads; 5 %: their sizes are taken from pressures
+    loads = 2 * np.pi * RADIUS * float((THEORY["soil_pressure"] + THEORY["water_pressure"]).mean())
+    assert given["unborne_resultant"].item() == pytest.approx(
+        0.1 * 2 * np.pi * RADIUS**2 / ring.centre_radius / loads, rel=0.05
+    )
+    for name in ("axial_force", "bending_moment", "displacement_radial", "displacement_tangential"):
+        # 1e-7 of the largest: Newton's tolerance, amplified by the softness of the ring
+        np.testing.assert_allclose(given[name], straight[name], atol=1e-7 * np.abs(straight[name]).max().item())
+
+
+@pytest.mark.parametrize("model", [BeamSpringLining, ContinuumLining])
+def test_torque_that_nothing_bears_is_refused_with_its_size(model):
+    ring = without_tangential_springs((20.0, 110.0, 170.0, 260.0, 333.0))
+    twisted = THEORY.assign(soil_shear=THEORY["soil_shear"] + 1e3)
+    with pytest.raises(ValueError, match="switch tangential_springs on, or subtract the mean of soil_shear") as refusal:
+        model(ring).respond(twisted)
+    torque = float(re.search(r"a net torque of (\S+) N m/m clockwise", str(refusal.value))[1])
+    # 1e-4: 1 kPa on the outer face, printed with six digits
+    assert torque == pytest.approx(1e3 * 2 * np.pi * RADIUS**2, rel=1e-4)
+
+
+@pytest.mark.parametrize("model", [BeamSpringLining, ContinuumLining])
+def test_ring_that_may_turn_freely_is_reported_without_a_turn(model):
+    response = model(without_tangential_springs((20.0, 110.0, 170.0, 260.0, 333.0))).respond(THEORY).isel(time=0)
+    # 1e-3: the mean over the elements' middles stands for that over the ring
+    mean = response["displacement_tangential"].mean().item()
+    assert abs(mean) < 1e-3 * np.abs(response["displacement_tangential"]).max().item()
+
+
+@pytest.mark.parametrize("columns", [12, 37, 360])
+def test_loads_have_the_resultants_of_their_tractions(columns):
+    rng = np.random.default_rng(5)
+    theta = np.sort(rng.uniform(0, 2 * np.pi, 50))
+    pressure, shear = rng.uniform(0, 4e5, 50), rng.uniform(-1e5, 1e5, 50)
+    ring = Ring(**LINING, **ORDINARY, concrete_unit_weight=0.0, joint_angles=random_angles(rng), support="invert",
+                n_elements=max(columns, 180))  # fmt: skip
+    loads = loads_of(np.degrees(theta), pressure, shear)
+    right, up, _ = RADIUS * sums(theta, pressure, shear)
+    for model in (BeamSpringLining(ring), ContinuumLining(ring, columns=columns)):
+        response = model.respond(loads).isel(time=0)
+        # 1e-12 of the loads: exact between the samples but for rounding
+        assert response["load_sum_horizontal"].item() == pytest.approx(right, abs=1e-12 * 4e6)
+        assert response["load_sum_vertical"].item() == pytest.approx(up, abs=1e-12 * 4e6)
