@@ -7,7 +7,7 @@ import numpy as np
 from coupling.postprocess import filled
 from mpm.scene import Scene
 from mpm.solver import Solver
-from mpm.variables import MASS, SXX, SXY, SYY, SZZ, V_P, VSX, VSY, P
+from mpm.variables import MASS, SXX, SXY, SYY, SZZ, VSX, VSY, P
 
 GRAIN_DENSITY, POROSITY, LOOSE = 2650.0, 0.45, 0.55
 
@@ -56,7 +56,6 @@ def dropped_block(width=1.6, size=0.1):
     })  # fmt: skip
     solver = Solver(scene, box_mesh(width, 2.0, size, (-0.3, 0.3, -1.7, -1.1)))
     solver.points[:, [P, SXX, SYY, SZZ, SXY]] = 0.0
-    solver.nodes[:, V_P] = 0.0
     return solver
 
 

@@ -20,7 +20,7 @@ BUILT = {
 }  # fmt: skip
 #: Written by each step before it is read.
 SCRATCH = {
-    "tied_means", "means", "status", "_spare", "_left", "_counts", "_measures",
+    "tied_means", "status", "_spare", "_left", "_counts", "_measures",
     "_suspended", "_bad", "_n_left", "_first_left",
 }  # fmt: skip
 STATE = {*ARRAYS, *NUMBERS, "gate_open", "_mapped", "_limits", "mode"}
