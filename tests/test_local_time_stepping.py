@@ -8,7 +8,7 @@ import coupling
 import mpm
 from coupling.stability.monitor import kinetic_energy
 from coupling.verification.boxes import box_mesh
-from coupling.verification.driven import dry_scene
+from coupling.verification.driven import box_scene
 from mpm.variables import MASS, S_RHO_S, VLX, VLY, VSX, VSY, N, X, Y
 
 GRADED = {**COARSE, "size_growth": 0.3}
@@ -62,7 +62,7 @@ def test_every_level_steps_within_the_limit_of_its_elements(mesh):
 
 def test_elements_of_one_size_are_one_level():
     mesh = box_mesh(np.linspace(-2, 2, 9), np.linspace(-4, 0, 9))
-    solver = mpm.Solver(dry_scene("column", 0.5, 4.0, 4.0, {"model": "elastic"}), mesh)
+    solver = mpm.Solver(box_scene("column", 0.5, 4.0, 4.0, {"model": "elastic"}), mesh)
     assert solver.levels.count == 1 and len(solver.nodes) == len(mesh.nodes)
 
 
@@ -113,7 +113,7 @@ def pulse_error(local, courant=0.8, coarse=0.4, fine=0.1):
     Norm: root mean square over that of the exact answer, d'Alembert: v(y, t) = (f(y - c t) + f(y + c t)) / 2 with
     images at the free surface (same sign) and at the fixed bottom (opposite sign).
     """
-    scene = dry_scene("pulse", 0.4, 1.6, 24.0, {"model": "elastic"}, gravity=1e-9, courant=courant, pic_rate=0.0,
+    scene = box_scene("pulse", 0.4, 1.6, 24.0, {"model": "elastic"}, gravity=1e-9, courant=courant, pic_rate=0.0,
                       local_time_stepping=local)  # fmt: skip
     solver = mpm.Solver(scene, graded_column(coarse, fine), threads=1)
     assert (solver.levels.count > 1) == local
