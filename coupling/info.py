@@ -113,6 +113,7 @@ def _run_facts(file):
     import h5netcdf
 
     from coupling.datasets import read_attributes, read_history
+    from coupling.quality import poor_errors, quality_line, stored_quality
 
     attributes, history = read_attributes(file), read_history(file)
     facts = {
@@ -132,7 +133,9 @@ def _run_facts(file):
             facts["triangles"] = int(content["mesh"].dimensions["element"].size)
         models = list(content["structure"].groups) if "structure" in content.groups else []
     facts["lining models"] = ", ".join(models) or "none"
-    return facts
+    errors = stored_quality(attributes)
+    facts |= {"errors": quality_line(errors)} if errors else {}
+    return facts | {f"warning {k}": text for k, text in enumerate(poor_errors(errors), start=1)}
 
 
 def _run_commands(path):

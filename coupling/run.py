@@ -4,8 +4,9 @@ import contextlib
 import logging
 
 from coupling.checkpoint import remove_checkpoints
-from coupling.datasets import read_pressures, write_response
+from coupling.datasets import read_attributes, read_pressures, write_response
 from coupling.plausibility import warnings_of
+from coupling.quality import poor_errors, stored_quality
 from coupling.recorded_simulation import RecordedSimulation, write_quality
 from coupling.resume import find_remains
 from coupling.run_folder import FIGURES, LOG_FILE, RUN_FILE, RunRefused, claimed, default_folder, reopened
@@ -84,8 +85,12 @@ def run(
             remove_checkpoints(folder)
         else:
             RecordedSimulation(scene, folder, report, threads, checkpoint_interval, remains).run()
-        if figures:
-            finish(scene, folder, report)
+        try:
+            if figures:
+                finish(scene, folder, report)
+        finally:
+            for warning in poor_errors(stored_quality(read_attributes(folder))):
+                _teller(warn)(warning)
         pressures = read_pressures(folder)
     pressures.attrs |= {"run": str(folder), "scene_name": scene.name}
     return pressures

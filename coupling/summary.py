@@ -3,7 +3,7 @@
 import numpy as np
 
 from coupling.datasets import read_attributes, read_history, read_pressures
-from coupling.quality import quality
+from coupling.quality import quality, verdicts
 from mpm.variables import CLAMPS
 
 PLACES = {"crown": 0, "right waist": 90, "invert": 180, "left waist": 270}
@@ -18,7 +18,7 @@ def summarise_run(run):
         scene, status, status_message; records; time [s]; inflow_mass [kg/m]; flow_zone_area, disturbed_area [m2];
         steps; point_steps; mean_dt [s]; dt_limit; max_velocity [m/s]; grain_mass_error [-]: largest relative
         departure from the initial grain mass; wall_seconds, cpu_seconds, point_steps_per_cpu_second; clamps: updates
-        at which each limit acted; quality: see :func:`coupling.quality.quality`; soil_pressure, water_pressure [Pa]:
+        at which each limit acted; quality, verdicts: see :mod:`coupling.quality`; soil_pressure, water_pressure [Pa]:
         place to {initial, final}, of the tunnel with the gate; tunnels: number of any other to the same two and
         `response`, None.
     """
@@ -50,6 +50,7 @@ def summarise_run(run):
         "clamps": {name: int(last[f"clamp_{name}"]) for name in CLAMPS},
         "quality": quality(history),
     }
+    data["verdicts"] = verdicts(data["quality"])
     data["tunnels"] = {}
     if "tunnel" in pressures.dims:
         gate = int(pressures.attrs.get("gate_tunnel", 0))

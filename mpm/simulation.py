@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mpm.clock import ALMOST_ALL
+from mpm.errors import errors, largest_so_far
 from mpm.meshing import build_mesh
 from mpm.solver import RunFailed, Solver
 from mpm.state import restore_solver, solver_state
@@ -25,7 +26,7 @@ class Record:
     soil_shear (clockwise traction on the lining) and the standard deviation of the first two within the interval;
     of a lining that moves also its displacement at the end, and of an elastic one its forces
     (`mpm.wall.MovingLinings.motion_at`).
-    `balances` are those of :meth:`mpm.Solver.balances`.
+    `balances` are those of :meth:`mpm.Solver.balances`, `errors` those of :func:`mpm.errors.errors`.
     """
 
     time: float
@@ -38,10 +39,12 @@ class Record:
     disturbed_area: float
     grain_mass: float
     suspended_fraction: float
+    tip_fraction: float
     kinetic_energy: float
     max_velocity: float
     clamp_counts: dict
     balances: dict
+    errors: dict
     point_steps: int
     cpu_seconds: float
     points: dict | None
@@ -88,6 +91,7 @@ class Simulation:
         self._next_snapshot = scene.output.snapshot_interval or np.inf
         self._inflow, self._checked = 0.0, -STEPS_BETWEEN_CHECKS  # kg/m, and when
         self._near = False  # whether the inflow may reach its stop before it is checked again
+        self._largest = {}  # departures and amounts of the balances at the records so far
         self._progress = progress
         self._last_report = clock.monotonic(), 0
 
@@ -206,6 +210,7 @@ class Simulation:
             "checked": self._checked,
             "near": self._near,
             "reached": self._reached,
+            "largest": json.dumps(self._largest),
             "done": self.done,
             "cpu_seconds": self.cpu_seconds,
         }
@@ -225,6 +230,7 @@ class Simulation:
         self._next_snapshot, self._inflow = float(state["next_snapshot"]), float(state["inflow_mass"])
         self._checked, self._near = int(state["checked"]), bool(state.get("near", True))
         self._reached, self.done = bool(state["reached"]), bool(state["done"])
+        self._largest = json.loads(state["largest"])
         self._cpu_begin = clock.process_time() - float(state["cpu_seconds"])
         self._last_report = clock.monotonic(), self.solver.point_steps
 
@@ -235,6 +241,8 @@ class Simulation:
 
     def _record(self, duration, dt, limit, snapshot):
         solver = self.solver
+        balances = solver.balances()
+        self._largest = largest_so_far(self._largest, balances)
         return Record(
             time=solver.time,
             dt=dt,
@@ -242,7 +250,8 @@ class Simulation:
             steps=solver.step_count,
             lining=solver.lining_pressures(duration),
             clamp_counts=dict(zip(CLAMPS, solver.clamps.sum(axis=0).tolist(), strict=True)),
-            balances=solver.balances(),
+            balances=balances,
+            errors=errors(self._largest),
             point_steps=solver.point_steps,
             cpu_seconds=self.cpu_seconds,
             points=solver.points_by_name() if snapshot and self.scene.output.points else None,
