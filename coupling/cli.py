@@ -120,7 +120,7 @@ def run_command(
                 if one["response"]:
                     console.print(_response_table(one["response"], tunnel))
             console.print(f"errors: {quality_line(data['quality'])}", highlight=False)
-            console.print(f"states, no errors: {states_line(data['quality'])}", highlight=False)
+            console.print(f"states of the points, no errors: {states_line(data['quality'])}", highlight=False)
             console.print(f"results in {folder}", highlight=False, soft_wrap=True)
 
 

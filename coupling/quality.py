@@ -60,8 +60,8 @@ ERRORS = {
         "lining equilibrium", "{:.0e}", "of the loads", 1e-6, 1e-6, "look at the ring's joints and springs"
     ),
 }
-#: States that material may be in, not errors: shares of the points, the largest of all records.
-STATES = {"tip_fraction": CLAMPS["tension"], "suspended_fraction": CLAMPS["suspended"]}
+#: States that material may be in, not errors, of which a record knows the share of points: name to the limit met.
+STATES = {"tip_fraction": "tension", "suspended_fraction": "suspended"}
 #: What no sound run does: porosities out of their range, points through walls.
 HELD = ("porosity_floor", "porosity_ceiling", "returned_to_mesh")
 
@@ -119,9 +119,9 @@ def quality_line(values):
 
 def states_line(values):
     """The states and limits that points met, which are no errors, in one line for people."""
-    points = [f"{label} {values[name]:.1%} of points" for name, label in STATES.items() if name in values]
-    steps = [f"{CLAMPS[name]} {share:.2%} of point-steps" for name, share in values["clamps"].items() if share > 0]
-    return ", ".join(points + steps)
+    points = {clamp: f"{values[name]:.1%} of points, " for name, clamp in STATES.items() if name in values}
+    met = {name: share for name, share in values["clamps"].items() if share > 0}
+    return "; ".join(f"{CLAMPS[name]} {points.get(name, '')}{share:.2%} of point-steps" for name, share in met.items())
 
 
 def poor_errors(values):

@@ -52,7 +52,7 @@ MODEL_ELASTIC, MODEL_MOHR_COULOMB = 0, 1
 CLAMPS = {
     "tension": "tip of the Mohr-Coulomb cone",
     "suspended": "grains apart",
-    "cavitated": "water missing",
+    "cavitated": "pores not full",
     "porosity_floor": "densest porosity",
     "porosity_ceiling": "loosest porosity",
     "returned_to_mesh": "put back onto a wall",

@@ -10,6 +10,16 @@ from coupling.report.series import match_times, model_names, tunnels_beside
 from coupling.summary import PLACES
 from mpm.variables import CLAMPS
 
+#: What it means that points meet a limit, by its name in :data:`mpm.variables.CLAMPS`.
+MEANINGS = {
+    "tension": "grains that are not pressed together bear no tension",
+    "suspended": "looser than the loose porosity they do not touch and bear no stress",
+    "cavitated": "water that is missing does not pull",
+    "porosity_floor": "held there; no sound run reaches it",
+    "porosity_ceiling": "held there; no sound run reaches it",
+    "returned_to_mesh": "they would have left the mesh within a step",
+}
+
 #: Variable and which extreme of it: (label, unit shown, factor from SI).
 RING_EXTREMES = {
     "axial_force_max": ("axial force N, largest", "kN/m", 1e-3),
@@ -257,10 +267,9 @@ def quality(run, summary, scene=None):
             share = float(np.abs(response["shear_moment_residual"]).max() / np.nanmax(np.abs(response["shear_force"])))
             rows.append((f"Q = -dM/ds, {name}: largest departure over the largest Q", f"{share:.1e}",
                          share <= SHEAR_LIMIT))  # fmt: skip
-    rows += [(f"points, {label}", f"{values[name]:.1%} of all, at most", None)
-             for name, label in STATES.items() if name in values]  # fmt: skip
-    rows += [(f"point-steps, {CLAMPS[name]}", f"{share:.2%} of all", None)
-             for name, share in values["clamps"].items()]  # fmt: skip
+    points = {clamp: f"{values[name]:.1%} of points at most, " for name, clamp in STATES.items() if name in values}
+    rows += [(f"{label}: {MEANINGS[name]}", f"{points.get(name, '')}{values['clamps'][name]:.2%} of point-steps", None)
+             for name, label in CLAMPS.items()]  # fmt: skip
     for name, variable in run["history"].to_dataset().data_vars.items():
         if name not in HISTORY and variable.dims == ("time",):
             worst, unit = float(np.abs(variable).max()), variable.attrs.get("units", "")
