@@ -564,8 +564,8 @@ def _with_entries(name: str, entries: list[Any] | tuple[Any, ...], changes: dict
         number = int(key) if str(key).isdecimal() else len(result)
         if number >= len(result):
             raise SceneError(
-                f"{name}.{shortened(str(key))[1:-1]}: must be a number below {len(result)}, the length of that list; as "
-                f"in {name}.0"
+                f"{name}.{shortened(str(key))[1:-1]}: must be a number below {len(result)}, the length of that list; "
+                f"as in {name}.0"
             )
         here = result[number]
         result[number] = changed(here, value) if isinstance(here, dict) and isinstance(value, dict) else value

@@ -31,7 +31,7 @@ def choose_frames(run):
 
 
 def model_names(run, tunnel=None):
-    """Lining models, as users call them, that have answered for a tunnel, None: that with the gate; the leading first."""
+    """Names of the lining models that have answered for a tunnel, None: that with the gate; the leading one first."""
     home = structure_group("", tunnel).rstrip("/")
     answered = run[home].children if home in run.children else {}
     return [str(response.attrs.get("model", group)) for group, response in answered.items()]
