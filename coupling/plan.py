@@ -253,6 +253,11 @@ def features(scene: Scene, threads: int, why_alone: str = "one thread") -> list[
             numerics.pressure_filter > 0 and s.water is not None,
             f"{numerics.pressure_filter:g} of what no node feels, a step" if numerics.pressure_filter else "set to 0",
         ),
+        (
+            "stress damping",
+            numerics.stress_damping > 0,
+            f"stress runs ahead by {numerics.stress_damping:g} of a step" if numerics.stress_damping else "set to 0",
+        ),
         ("motion of the lining", any(s.lining_of(t) != "fixed" for t in s.tunnels), _linings(s)),
         ("the half x < 0", not s.is_half, _why_half(s)),
         (

@@ -23,21 +23,22 @@ def element_size(scene: Scene, x: NDArray[np.float64], y: NDArray[np.float64]) -
     """
     d = scene.discretisation
     x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    size = np.full(np.broadcast(x, y).shape, d.element_size)
+    size, slope = np.full(np.broadcast(x, y).shape, d.element_size), scene.discretisation.growth
     for each in scene.tunnels:
         gap = np.abs(np.hypot(x - each.x, y + each.axis_depth) - each.outer_radius)
-        size = np.minimum(size, d.element_size_lining + d.size_growth * gap)
+        size = np.minimum(size, d.element_size_lining + slope * gap)
     gate, tunnel = scene.gate, gate_tunnel(scene)
     if gate is None or tunnel is None:
         return size
     inside = np.hypot(x - tunnel.x, y + tunnel.axis_depth) < tunnel.inner_radius
     size = np.where(inside, np.minimum(size, d.element_size_interior), size)
-    # Distance to the channel's centre line, from outer to inner face.
+    # Distance to the channel, from outer to inner face and from wall to wall.
     along, across = gate_axes(gate.angle)
     s = (x - tunnel.x) * along[0] + (y + tunnel.axis_depth) * along[1]
     t = (x - tunnel.x) * across[0] + (y + tunnel.axis_depth) * across[1]
-    distance = np.hypot(s - np.clip(s, tunnel.inner_radius, tunnel.outer_radius), t)
-    return np.minimum(size, gate_size(scene) + d.size_growth * distance)
+    beside = np.maximum(np.abs(t) - gate.width / 2, 0.0)
+    distance = np.hypot(s - np.clip(s, tunnel.inner_radius, tunnel.outer_radius), beside)
+    return np.minimum(size, gate_size(scene) + slope * distance)
 
 
 def gate_tunnel(scene: Scene) -> Tunnel | None:
@@ -64,7 +65,7 @@ def gate_axes(angle: float) -> tuple[tuple[float, float], tuple[float, float]]:
 
 def size_callback(scene: Scene, factor: float) -> Any:
     """`factor` times `element_size` for one point, in scalar arithmetic: gmsh asks some 10 000 times."""
-    d = scene.discretisation
+    d, slope = scene.discretisation, scene.discretisation.growth
     rings = [(t.x, -t.axis_depth, t.outer_radius) for t in scene.tunnels]
     gate, tunnel = scene.gate, gate_tunnel(scene)
 
@@ -72,7 +73,7 @@ def size_callback(scene: Scene, factor: float) -> Any:
         result = d.element_size
         for xt, yt, radius in rings:
             gap = abs(math.hypot(x - xt, y - yt) - radius)
-            result = min(result, d.element_size_lining + d.size_growth * gap)
+            result = min(result, d.element_size_lining + slope * gap)
         if gate is None or tunnel is None:
             return factor * result
         dx, dy = x - tunnel.x, y + tunnel.axis_depth
@@ -80,8 +81,9 @@ def size_callback(scene: Scene, factor: float) -> Any:
             result = min(result, d.element_size_interior)
         s = dx * along[0] + dy * along[1]
         t = dx * across[0] + dy * across[1]
-        distance = math.hypot(s - min(max(s, tunnel.inner_radius), tunnel.outer_radius), t)
-        return factor * min(result, at_gate + d.size_growth * distance)
+        beside = max(abs(t) - gate.width / 2, 0.0)
+        distance = math.hypot(s - min(max(s, tunnel.inner_radius), tunnel.outer_radius), beside)
+        return factor * min(result, at_gate + slope * distance)
 
     if gate is not None:
         along, across = gate_axes(gate.angle)

@@ -20,8 +20,11 @@ if TYPE_CHECKING:
 
 # Area of a corner over the squared edge below which its stand-in is much larger than it.
 SOFTNESS = 0.05
+# Of the size in the measure that is relaxed, and exponent that makes the worst corners count most.
 WEIGHT, POWER = 2.0, 3
-ENOUGH, SWEEPS = 0.4, 20
+# Altitudes that are high enough: shares of the size asked for there and of the smallest one; in a square it is 0.5. The
+# smallest elements set the time step of all, so more is asked of them.
+ENOUGH, SWEEPS = (0.3, 0.13), 20
 SYSTEM_PACKAGES = "libglu1-mesa libgl1 libxrender1 libxcursor1 libxft2 libxinerama1 libgomp1"
 
 
@@ -81,7 +84,9 @@ def fill_faces(scene: Scene, outline: Outline, algorithm: int) -> None:
 
 def _draw(gmsh: Any, outline: Outline) -> tuple[dict[int, int], list[int]]:
     """Every second node of the lines and one line from each to the next; gmsh points of nodes, and surfaces."""
-    geo, tags, lines = gmsh.model.geo, {}, {}
+    geo = gmsh.model.geo
+    tags: dict[int, int] = {}
+    lines: dict[tuple[int, int], int] = {}
 
     def point(node: int) -> int:
         if node not in tags:
@@ -221,7 +226,9 @@ def relax(
     count = np.bincount(cells.ravel(), minlength=len(nodes))
     start = np.concatenate([[0], np.cumsum(count)])
     around = np.argsort(cells.ravel(), kind="stable") // 4
-    lift_lowest(position, elements, np.sqrt(size), free.ravel(), start, around, ENOUGH, SWEEPS)
+    edge = np.sqrt(size)
+    height = ENOUGH[0] * edge + ENOUGH[1] * edge.min()
+    lift_lowest(position, elements, height, free.ravel(), start, around, SWEEPS)
     return position.reshape(-1, 2)
 
 
@@ -285,16 +292,15 @@ def lowest_altitude(position, corner):
 
 
 @kernel
-def lift_lowest(position, cells, size, free, start, around, enough, sweeps):
-    """Move free nodes one by one so that the lowest triangle around each becomes higher, over the size asked for.
+def lift_lowest(position, cells, height, free, start, around, sweeps):
+    """Move free nodes one by one so that the lowest triangle around each comes closer to the height asked for.
 
     position : (2 n,) float64, changed.
-    size : (m,) float64
+    height : (m,) float64
+        Where all triangles around a node are as high as that it stays [m].
     free : (2 n,) bool
     start, around : (n + 1,), (4 m,) int
         Cells around node i: ``around[start[i]:start[i + 1]]``.
-    enough : float
-        Where all triangles around a node are as high as that it stays.
     """
     for _ in range(sweeps):
         moved = False
@@ -305,12 +311,12 @@ def lift_lowest(position, cells, size, free, start, around, enough, sweeps):
             lowest, step = math.inf, math.inf
             for j in range(first, last):
                 q = around[j]
-                lowest = min(lowest, lowest_altitude(position, cells[q]) / size[q])
-                step = min(step, size[q])
-            if lowest >= enough:
+                lowest = min(lowest, lowest_altitude(position, cells[q]) / height[q])
+                step = min(step, height[q])
+            if lowest >= 1.0:
                 continue
-            step *= 0.1
-            while step > 1e-3 * size[around[first]]:
+            step *= 0.25
+            while step > 2e-3 * height[around[first]]:
                 better = False
                 for k in range(8):
                     dx = step * math.cos(0.25 * math.pi * k) if free[2 * i] else 0.0
@@ -320,7 +326,7 @@ def lift_lowest(position, cells, size, free, start, around, enough, sweeps):
                     then = math.inf
                     for j in range(first, last):
                         q = around[j]
-                        then = min(then, lowest_altitude(position, cells[q]) / size[q])
+                        then = min(then, lowest_altitude(position, cells[q]) / height[q])
                         if then <= lowest + 1e-6:
                             break
                     if then > lowest + 1e-6:
@@ -339,5 +345,8 @@ def crossing(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     first, second = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
     between = corners[:, 1] - corners[:, 0]
     turn = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-    share = (between[:, 0] * second[:, 1] - between[:, 1] * second[:, 0]) / np.where(turn > 0, turn, math.nan)
-    return corners[:, 0] + share[:, None] * first
+    turn = np.where(turn > 0, turn, math.nan)
+    share = (between[:, 0] * second[:, 1] - between[:, 1] * second[:, 0]) / turn
+    other = (between[:, 0] * first[:, 1] - between[:, 1] * first[:, 0]) / turn
+    meet = (share > 0) & (share < 1) & (other > 0) & (other < 1)
+    return np.where(meet[:, None], corners[:, 0] + share[:, None] * first, math.nan)

@@ -93,7 +93,8 @@ class Levels:
 def element_levels(elements, n_nodes, altitude, weight):
     """Level of every element, such that its altitude is at least 2^level times that of level 0.
 
-    The altitude where level 0 begins lies between half and all of the shortest one: where the work is least.
+    The altitude where level 0 begins lies between half and all of the shortest one: where the work is least. The four
+    elements of a cell, one after the other, are of one level, that of the lowest.
 
     Parameters
     ----------
@@ -108,30 +109,27 @@ def element_levels(elements, n_nodes, altitude, weight):
     -------
     (n_elements,) int8
     """
-    best, least = np.zeros(len(elements), np.int8), float(weight.sum())
+    cells = elements.reshape(-1, 12)
+    altitude, weight = altitude.reshape(-1, 4).min(axis=1), weight.reshape(-1, 4).sum(axis=1)
+    best, least = np.zeros(len(cells), np.int8), float(weight.sum())
     for offset in OFFSETS[::-1]:
         own = np.floor(np.log2(altitude / (offset * altitude.min())) + 1e-9).astype(np.int8)
-        level = _of_cells(_widened(np.minimum(own, MOST_LEVELS - 1), elements, n_nodes))
+        level = _widened(np.minimum(own, MOST_LEVELS - 1), cells, n_nodes)
         work = float((weight / 2.0**level).sum()) / offset
         if work < 0.999 * least:
             best, least = level, work
-    return best
+    return np.repeat(best, 4)
 
 
-def _finest_at_nodes(level, elements, n_nodes):
+def _finest_at_nodes(level, cells, n_nodes):
     finest = np.full(n_nodes, MOST_LEVELS, np.int8)
-    np.minimum.at(finest, elements.ravel(), np.repeat(level, 3))
+    np.minimum.at(finest, cells.ravel(), np.repeat(level, cells.shape[1]))
     return finest
 
 
-def _widened(level, elements, n_nodes):
-    """Give all elements around a node its finest level, so that the smallest element has a whole patch around it."""
-    return _finest_at_nodes(level, elements, n_nodes)[elements].min(axis=1)
-
-
-def _of_cells(level):
-    """Give the four elements of a quadrilateral their finest level: they share what they know of the pore pressure."""
-    return np.repeat(level.reshape(-1, 4).min(axis=1), 4)
+def _widened(level, cells, n_nodes):
+    """Give all cells around a node its finest level, so that the smallest cell has a whole patch around it."""
+    return _finest_at_nodes(level, cells, n_nodes)[cells].min(axis=1)
 
 
 def sorted_by_level(mesh, level):

@@ -91,8 +91,13 @@ class Mesh:
 
     @cached_property
     def quality(self) -> dict[str, float]:
-        """Counts, smallest altitude and its place [m], extreme angles [deg], share of triangles with one below 30."""
+        """Counts, smallest altitude and its place [m], extreme angles [deg], share of triangles with one below 30.
+
+        ``min_relative_altitude`` is the smallest altitude of a triangle over the root of its cell's area [-]: 0.5 in a
+        square.
+        """
         altitude = altitudes(self.nodes, self.elements)
+        area = areas(self.nodes, self.elements).reshape(-1, 4).sum(axis=1)
         angle = np.degrees(angles(self.nodes, self.elements))
         worst = int(altitude.argmin())
         x, y = self.nodes[self.elements[worst]].mean(axis=0)
@@ -102,6 +107,7 @@ class Mesh:
             "min_altitude": float(altitude[worst]),
             "min_altitude_x": float(x),
             "min_altitude_y": float(y),
+            "min_relative_altitude": float((altitude.reshape(-1, 4).min(axis=1) / np.sqrt(area)).min()),
             "min_angle": float(angle.min()),
             "max_angle": float(angle.max()),
             "share_below_30_degrees": float((angle.min(axis=1) < 30).mean()),
@@ -211,7 +217,7 @@ _NODE_SETS = (
 )  # fmt: skip
 
 
-def altitudes(nodes: NDArray[np.float64], elements: NDArray[np.int32]) -> NDArray[np.float64]:
+def altitudes(nodes: NDArray[np.float64], elements: NDArray[np.integer]) -> NDArray[np.float64]:
     """Smallest altitude of each triangle [m], shape (m,): twice the area over the longest edge."""
     corner = nodes[elements]
     edge = np.roll(corner, -1, axis=1) - corner
@@ -219,13 +225,13 @@ def altitudes(nodes: NDArray[np.float64], elements: NDArray[np.int32]) -> NDArra
     return 2 * areas(nodes, elements) / longest
 
 
-def areas(nodes: NDArray[np.float64], elements: NDArray[np.int32]) -> NDArray[np.float64]:
+def areas(nodes: NDArray[np.float64], elements: NDArray[np.integer]) -> NDArray[np.float64]:
     """Area of each triangle [m2], shape (m,), positive when counter-clockwise."""
     a, b, c = (nodes[elements[:, i]] for i in range(3))
     return 0.5 * ((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1]))
 
 
-def angles(nodes: NDArray[np.float64], elements: NDArray[np.int32]) -> NDArray[np.float64]:
+def angles(nodes: NDArray[np.float64], elements: NDArray[np.integer]) -> NDArray[np.float64]:
     """Angles of each triangle at its nodes [rad], shape (m, 3)."""
     corner = nodes[elements]
     forward = np.roll(corner, -1, axis=1) - corner

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +11,7 @@ from mpm.element_size import element_size
 from mpm.filling import crossing, fill_faces, relax
 from mpm.half_model import with_mirror_image
 from mpm.mesh import Mesh, MeshError, altitudes
-from mpm.outline import Outline, draw_headroom, draw_scene
+from mpm.outline import Outline, draw_headroom, draw_scene, horizontal_lines
 from mpm.scene import Scene
 
 if TYPE_CHECKING:
@@ -22,9 +21,9 @@ if TYPE_CHECKING:
 # the first is taken, one worse than the second refused: flatter triangles would set the time step of the whole run
 # while resolving nothing.
 GOOD_ALTITUDE, MIN_RELATIVE_ALTITUDE = 0.25, 0.15
-# Rows of regular cells along the linings and meshing algorithms of gmsh (frontal for quadrilaterals, frontal, Delaunay)
+# Most rows of regular cells along a lining and gmsh's algorithm (8 frontal for quadrilaterals, 6 frontal, 5 Delaunay),
 # in the order tried.
-ROWS, ALGORITHMS = (3, 1, 0), (8, 6, 5)
+ATTEMPTS = ((3, 8), (3, 6), (2, 8), (1, 8), (1, 6), (0, 8), (0, 6), (0, 5))
 ITERATIONS = 100
 
 
@@ -46,17 +45,26 @@ def build_mesh(scene: Scene) -> Mesh:
         When a triangle would be much flatter than the size asked for, or gmsh or its system libraries fail.
     """
     best: tuple[float, NDArray[np.float64], Outline, NDArray[np.int64]] | None = None
-    for rows, algorithm in product(ROWS, ALGORITHMS):
-        outline, cells = _cells(scene, rows, algorithm)
+    failure = MeshError("mesh: channel and rows along the linings must not fold, got none that fit; refine the linings")
+    for rows, algorithm in ATTEMPTS:
+        outline = draw_scene(scene, rows)
+        if not _is_regular(outline):
+            continue
+        try:
+            cells = _cells(scene, outline, algorithm)
+        except MeshError as error:
+            failure = error
+            continue
         lowest, where = _flattest(scene, outline.nodes, cells)
         if best is None or lowest > best[0]:
             best = lowest, where, outline, cells
         if lowest >= GOOD_ALTITUDE:
             break
-    assert best is not None
+    if best is None:
+        raise failure
     lowest, where, outline, cells = best
     if lowest < MIN_RELATIVE_ALTITUDE:
-        size = float(element_size(scene, *where))
+        size = float(_size(scene, where[None])[0])
         raise MeshError(
             f"mesh: the flattest triangle must be at least {MIN_RELATIVE_ALTITUDE:g} element sizes high, got "
             f"{lowest:.2g} ({lowest * size:.2g} m, flattest near x = {where[0]:.2f} m, y = {where[1]:.2f} m); "
@@ -66,23 +74,38 @@ def build_mesh(scene: Scene) -> Mesh:
     return with_mirror_image(mesh) if scene.is_half else mesh
 
 
-def _cells(scene: Scene, rows: int, algorithm: int) -> tuple[Outline, NDArray[np.int64]]:
-    """One attempt: an outline with all its nodes, and the corners of its cells, counter-clockwise."""
-    outline = draw_scene(scene, rows)
+def _size(scene: Scene, place: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Cell size asked for at (n, 2) places [m]: at most half the distance of the lines around it, for two rows."""
+    size = element_size(scene, place[:, 0], place[:, 1])
+    levels = np.array([-scene.box.depth, *horizontal_lines(scene)[::-1], 0.0])
+    gap = np.concatenate([[math.inf], np.diff(levels), [math.inf]])
+    return np.minimum(size, gap[np.searchsorted(levels, place[:, 1])] / 2)
+
+
+def _is_regular(outline: Outline) -> bool:
+    """Whether the cells drawn by hand are convex and none is turned over: lines that cut a lining may fold them."""
+    for block in outline.cells:
+        area = _area(outline.nodes[block])
+        corners = outline.nodes[block if area[0] > 0 else block[:, ::-1]]
+        if not np.all(area * area[0] > 0) or np.isnan(crossing(corners)).any():
+            return False
+    return True
+
+
+def _cells(scene: Scene, outline: Outline, algorithm: int) -> NDArray[np.int64]:
+    """Fill an outline; corners of all cells, counter-clockwise."""
     fill_faces(scene, outline, algorithm)
     cells = np.concatenate(outline.cells)
     turned = _area(outline.nodes[cells]) < 0
     cells[turned] = cells[turned][:, ::-1]
-    centre = outline.nodes[cells].mean(axis=1)
-    size = element_size(scene, centre[:, 0], centre[:, 1]) ** 2
+    size = _size(scene, outline.nodes[cells].mean(axis=1)) ** 2
     outline.nodes = relax(outline.nodes, outline.free, cells, size, ITERATIONS)
-    beside = len(cells)
     outline.cells = [cells]
     draw_headroom(scene, outline)
     cells = np.concatenate(outline.cells)
-    turned = np.flatnonzero(_area(outline.nodes[cells[beside:]]) < 0) + beside
+    turned = _area(outline.nodes[cells]) < 0
     cells[turned] = cells[turned][:, ::-1]
-    return outline, cells
+    return cells
 
 
 def _area(corners: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -91,7 +114,7 @@ def _area(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     return 0.5 * (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
 
 
-def _crossed(nodes: NDArray[np.float64], cells: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def crossed(nodes: NDArray[np.float64], cells: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Nodes with the centres of the cells behind them, and the four triangles of each cell."""
     number = np.broadcast_to(len(nodes) + np.arange(len(cells))[:, None], cells.shape)
     triangles = np.stack([cells, np.roll(cells, -1, axis=1), number], axis=-1).reshape(-1, 3)
@@ -100,9 +123,9 @@ def _crossed(nodes: NDArray[np.float64], cells: NDArray[np.int64]) -> tuple[NDAr
 
 def _flattest(scene: Scene, nodes: NDArray[np.float64], cells: NDArray[np.int64]) -> tuple[float, NDArray[np.float64]]:
     """Smallest altitude over the size asked for, and the place of that triangle."""
-    points, triangles = _crossed(nodes, cells)
+    points, triangles = crossed(nodes, cells)
     middle = points[triangles].mean(axis=1)
-    relative = altitudes(points, triangles) / element_size(scene, middle[:, 0], middle[:, 1])
+    relative = altitudes(points, triangles) / _size(scene, middle)
     relative = np.nan_to_num(relative, nan=-1.0)
     worst = int(relative.argmin())
     return float(relative[worst]), nodes[cells[worst // 4]].mean(axis=0)
@@ -111,7 +134,7 @@ def _flattest(scene: Scene, nodes: NDArray[np.float64], cells: NDArray[np.int64]
 def _assemble(scene: Scene, outline: Outline, cells: NDArray[np.int64]) -> Mesh:
     """The mesh, sorted for locality."""
     order = np.argsort(_hilbert(outline.nodes[cells].mean(axis=1)), kind="stable")
-    nodes, triangles = _crossed(outline.nodes, cells[order])
+    nodes, triangles = crossed(outline.nodes, cells[order])
     region = np.repeat(np.array(outline.region, np.int8)[order], 4)
     # Nodes numbered by first use, so that neighbours in space are neighbours in memory; unused ones drop out.
     used, first = np.unique(triangles.ravel(), return_index=True)

@@ -18,16 +18,13 @@ from mpm.mesh import CHANNEL, HEADROOM, INTERIOR, SOIL, MeshError
 from mpm.scene import Scene, Tunnel
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import ArrayLike, NDArray
 
     Nodes = NDArray[np.int64]
 
 # Samples of the element size along a line that is divided.
 SAMPLES = 2001
-# A water table closer than this to a soil layer boundary or the surface, in element sizes there, is no mesh line: the
-# cells between the two would be flatter than a kink of the pore pressure inside a cell is wrong.
+# A water table closer than this to a soil layer boundary, surface or bottom, in element sizes, is no mesh line.
 NEAR_LINE = 1.5
 
 
@@ -75,9 +72,8 @@ class Outline:
         self.region += [region] * len(cells)
 
 
-def place(tunnel: Tunnel, radius: ArrayLike, theta: ArrayLike) -> NDArray[np.float64]:
+def place(tunnel: Tunnel, radius: float | NDArray[np.float64], theta: NDArray[np.float64]) -> NDArray[np.float64]:
     """Positions at angles [deg] about a tunnel's axis; those of a multiple of 90 degrees are exact."""
-    theta = np.asarray(theta, float)
     rad = np.radians(theta)
     sine, cosine = np.sin(rad), np.cos(rad)
     sine = np.where(np.mod(theta, 180.0) == 0, 0.0, sine)
@@ -109,7 +105,7 @@ def _line(scene: Scene, outline: Outline, start: int, end: int, beside: list[Nod
     if beside is not None and (sum(len(line) - 1 for line in beside) // 2 + pairs) % 2:
         pairs += 1 if pairs == 1 or pairs < cumulative[-1] / 2 else -1
     share = _divide(cumulative, 2 * pairs)[1:-1, None]
-    horizontal = a[1] == b[1]
+    horizontal = bool(a[1] == b[1])
     between = outline.add(a + share * (b - a), horizontal, not horizontal)
     outline.nodes[between, 1 if horizontal else 0] = a[1 if horizontal else 0]
     return np.concatenate([[start], between, [end]])
@@ -156,9 +152,9 @@ def _ring(scene: Scene, tunnel: Tunnel, radius: float, cuts: list[float], has_ga
     else:
         ends = sorted({0.0, 90.0, 180.0, 270.0} if not cuts else {*cuts, 0.0, 180.0})
         ends.append(ends[0] + 360.0)
-    hard = {t % 360.0 for t in cuts} | ({0.0, 180.0} if half_model else set())
+    hard = [*cuts, *([0.0, 180.0] if half_model else [])]
     arcs = list(pairwise(ends))
-    is_opening = [len(opening) > 0 and abs((a - opening[0]) % 360.0) < 1e-9 for a, _ in arcs]
+    is_opening = [len(opening) > 0 and _same_angle(a, opening[0]) for a, _ in arcs]
     measure = [_cumulative(scene, place(tunnel, radius, np.linspace(a, b, SAMPLES))) for a, b in arcs]
     counts = [
         len(opening) - 1 if open_ else max(1, math.ceil(m[-1] - 0.25))
@@ -184,10 +180,14 @@ def _ring(scene: Scene, tunnel: Tunnel, radius: float, cuts: list[float], has_ga
     return _Ring(angles, not half_model, [nearest(t) for t in cuts], np.array([nearest(t) for t in opening], int))
 
 
+def _same_angle(a: float, b: float) -> bool:
+    return abs((a - b + 180.0) % 360.0 - 180.0) < 1e-9
+
+
 def _make_even(arcs, counts, is_opening, hard, measure, closed):
     """Give an arc one edge more or less where the number of edges between two hard stations is odd."""
     n = len(arcs)
-    starts = [i for i, (a, _) in enumerate(arcs) if a % 360.0 in hard] or [0]
+    starts = [i for i, (a, _) in enumerate(arcs) if any(_same_angle(a, t) for t in hard)] or [0]
     for first, last in zip(starts, [*starts[1:], starts[0] + n if closed else n], strict=True):
         group = [i % n for i in range(first, last)]
         if sum(counts[i] for i in group) % 2:
@@ -214,11 +214,10 @@ def _rows(scene, outline, tunnel, ring, face, radius, count, outward, heights):
             padded = np.concatenate([thickness[1:2], thickness, thickness[-2:-1]])
             thickness = 0.5 * thickness + 0.25 * (padded[2:] + padded[:-2])
     grid = [face]
-    growth = scene.discretisation.size_growth
     offset = np.zeros_like(thickness)
     on_axis = np.zeros(len(theta), bool) if ring.closed else np.isin(np.arange(len(theta)), [0, len(theta) - 1])
     for j in range(count):
-        offset = offset + thickness * (1 + 0.5 * growth * j)
+        offset = offset + thickness * (1 + 0.5 * scene.discretisation.growth * j)
         r = radius + (offset if outward else -offset)
         angle = theta.copy()
         if ring.cuts:
@@ -260,8 +259,8 @@ def horizontal_lines(scene: Scene) -> list[float]:
     """Heights [m, downward] of soil layer boundaries, and of the water table where it is a mesh line of its own.
 
     The table is left out where it lies closer to a layer boundary, to the surface or to the bottom than `NEAR_LINE`
-    element sizes, or where it touches a tunnel near crown or invert, or beside its gate: a kink of the pore pressure
-    inside a cell does less harm than flat cells.
+    element sizes, within a third of a tunnel's radius (or four of the lining's elements) of its crown or invert, or
+    beside its gate: a kink of the pore pressure inside a cell does less harm than flat cells.
     """
     layers = [-soil.top_depth for soil in scene.soils[1:]]
     if scene.water is None:
@@ -271,7 +270,7 @@ def horizontal_lines(scene: Scene) -> list[float]:
         return layers
     for i, tunnel in enumerate(scene.tunnels):
         rise, radius = table + tunnel.axis_depth, tunnel.outer_radius
-        if abs(abs(rise) - radius) < max(0.35 * radius, 4 * scene.discretisation.element_size_lining):
+        if abs(abs(rise) - radius) < max(radius / 3, 4 * scene.discretisation.element_size_lining):
             return layers
         if (
             abs(rise) < radius
@@ -332,7 +331,7 @@ def draw_scene(scene: Scene, rows: int) -> Outline:
     for i, tunnel in enumerate(scene.tunnels):
         has_gate = scene.gate is not None and scene.gate.tunnel == i
         cut = [y for y in lines if abs(y + tunnel.axis_depth) < tunnel.outer_radius]
-        if has_gate:
+        if has_gate and scene.gate is not None:
             for y in cut:
                 if _meets_gate(scene, tunnel, y):
                     raise MeshError(
@@ -344,6 +343,8 @@ def draw_scene(scene: Scene, rows: int) -> Outline:
         cuts = sorted((t, y) for t, y in cuts if not scene.is_half or t < 180)
         ring = _ring(scene, tunnel, tunnel.outer_radius, [t for t, _ in cuts], has_gate)
         face = outline.add(place(tunnel, tunnel.outer_radius, ring.theta))
+        for k, (_, y) in zip(ring.cuts, cuts, strict=True):
+            outline.nodes[face[k], 1] = y  # but for round-off it is
         outline.outer.append(face)
         outline.theta.append(ring.theta)
         count = rows_that_fit(scene, i, lines, rows)
@@ -380,9 +381,8 @@ def _draw_gate(scene, outline, tunnel, ring, rows):
         ends = [-1] if scene.gate.angle == 0 else [0]
     outline.corners = mouth[ends]
     outline.walls = [columns[end][1:] for end in ends]
-    strict = slice(
-        0 if scene.is_half and scene.gate.angle == 0 else 1, None if scene.is_half and scene.gate.angle == 180 else -1
-    )
+    # Of the two ends of a half model's opening one lies on the mirror line and is no corner.
+    strict = slice(0 if ends == [-1] else 1, None if ends == [0] else -1)
     outline.opening, outline.inner_opening = mouth[strict], throat[strict]
     if scene.interior != "resolved":
         return
@@ -439,7 +439,7 @@ def _draw_ground(scene, outline, lines, rings, edges):
     for k, y in enumerate(lines, start=1):
         met = []
         for ring, edge in zip(rings, edges, strict=True):
-            at = [edge[i] for i in ring.cuts if abs(outline.nodes[edge[i], 1] - y) < 1e-12]
+            at = [edge[i] for i in ring.cuts if outline.nodes[edge[i], 1] == y]
             met += at
         met.sort(key=lambda node: outline.nodes[node, 0])
         ends = [*([left[k]] if left[k] >= 0 else []), *met, right[k]]
@@ -457,6 +457,3 @@ def draw_headroom(scene: Scene, outline: Outline) -> None:
         row[:, 1] = height * k / pieces if k < pieces else height
         rows.append(outline.add(row))
     outline.add_grid(np.stack(rows), HEADROOM)
-
-
-__all__: Sequence[str] = ("Face", "Outline", "draw_headroom", "draw_scene", "horizontal_lines", "place")

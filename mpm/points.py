@@ -129,7 +129,8 @@ def fill(mesh, scene):
                 -tunnel.axis_depth + tunnel.outer_radius * math.cos(angle),
             ]
         )
-        near_gate = np.hypot(*(centre - gate).T) < d.gate_radius
+        of_cell = centre.reshape(-1, 4, 2).mean(axis=1)
+        near_gate = np.repeat(np.hypot(*(of_cell - gate).T) < d.gate_radius, 4)
     parts, owner = [], []
     for count, chosen in (
         (d.points_per_element, soil_elements[~near_gate[soil_elements]]),

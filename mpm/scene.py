@@ -23,6 +23,8 @@ _QUANTITY = re.compile(
 )
 _DECIMAL_COMMA = re.compile(r"([0-9]),([0-9])")
 MOST_RECORDS = 1_000_000
+#: Growth of the element size per metre above which neighbouring quadrilaterals are no longer near squares.
+STEEPEST = 0.25
 _HOUR = 3600.0
 #: Share of k0 that its bounds give, so that 1 - sin(phi) over 1 + sin(phi) itself is borne.
 ROUNDING = 1e-9
@@ -261,7 +263,10 @@ class Gate(Part):
 
 
 class Discretisation(Part):
-    """Mesh sizes [m] and points per element; the size grows by `size_growth` per metre away from a feature."""
+    """Edges of the cells [m] and points per element; a cell has four elements, cut by its diagonals.
+
+    The size grows by `size_growth` per metre away from a feature, by at most 0.25.
+    """
 
     element_size: Length = Field(ge=1e-3, le=2000)
     element_size_lining: Length = Field(ge=1e-3, le=2000)
@@ -271,6 +276,11 @@ class Discretisation(Part):
     size_growth: float = Field(default=0.12, ge=0.01, le=1)
     points_per_element: int = Field(default=3, le=400)
     points_per_element_gate: int = Field(default=12, le=400)
+
+    @property
+    def growth(self):
+        """Growth of the size per metre that quadrilaterals follow [-]."""
+        return min(self.size_growth, STEEPEST)
 
     @model_validator(mode="after")
     def _check(self):
@@ -553,20 +563,21 @@ class Scene(Part):
 
     @cached_property
     def estimated_elements(self) -> float:
-        """Rough number of elements that are computed, from the integral of the inverse element area [-]."""
+        """Rough number of elements that are computed, from the integral of the inverse cell area, four a cell [-]."""
         d = self.discretisation
-        area = 0.433  # equilateral triangle of unit edge
-        height = self.box.depth + (self.box.headroom or d.element_size)
-        count = self.box.width * height / (area * d.element_size**2)
+        growth = d.growth
+        cells = self.box.width * (self.box.depth + (self.box.headroom or d.element_size)) / d.element_size**2
         for t in self.tunnels:
-            count += _graded(2 * math.pi * t.outer_radius, d.element_size_lining, d.element_size, d.size_growth) / area
-            if self.gate is not None and self.interior == "resolved":
-                count += math.pi * t.inner_radius**2 / (area * d.element_size_interior**2)
+            cells += _graded(2 * math.pi * t.outer_radius, d.element_size_lining, d.element_size, growth)
         if self.gate is not None:
+            t = self.tunnels[self.gate.tunnel]
             size = self.gate.width / d.elements_across_gate
-            near = math.pi * (self.gate.width + size / d.size_growth) ** 2
-            count += near / (area * size**2)
-        return count / 2 if self.is_half else count
+            cells += (t.outer_radius - t.inner_radius) * self.gate.width / size**2
+            cells += _fanned(self.gate.width, size, min(d.element_size_lining, d.element_size), growth)
+            if self.interior == "resolved":
+                cells += math.pi * t.inner_radius**2 / d.element_size_interior**2
+                cells += _fanned(self.gate.width, size, d.element_size_interior, growth)
+        return 2 * cells if self.is_half else 4 * cells
 
     @property
     def estimated_bytes(self) -> float:
@@ -583,5 +594,22 @@ def _physical_memory():
 
 
 def _graded(length, small, large, growth):
-    """Integral of 1/size^2 beside a line of the given length whose size grows away from it."""
-    return 0.0 if small >= large else length * (1 / small - 1 / large) / growth
+    """Integral of 1/size^2 - 1/large^2 beside a circle of the given length whose size grows away from it.
+
+    The area grows with the distance as well: that of a circle of this length.
+    """
+    if small >= large:
+        return 0.0
+    reach = (large - small) / growth
+    curved = 2 * math.pi / growth**2 * (math.log(large / small) + small / large - 1)
+    return length * (1 / small - 1 / large) / growth + curved - (length + math.pi * reach) * reach / large**2
+
+
+def _fanned(width, small, large, growth):
+    """Integral of 1/size^2 - 1/large^2 over the half plane before a gap whose size grows away from it."""
+    if small >= large:
+        return 0.0
+    reach = (large - small) / growth
+    fan = math.pi / growth**2 * (math.log(large / small) + small / large - 1)
+    strip = width * ((1 / small - 1 / large) / growth - reach / large**2)
+    return fan - 0.5 * math.pi * reach**2 / large**2 + strip

@@ -8,7 +8,7 @@ import numpy as np
 
 #: Arrays, copied in place. `sums` holds the points as mapped at the end of the last step, in its order of summation.
 ARRAYS = (
-    "points", "element_of_point", "soil_of_point", "initial_volume", "nodes", "sums", "volume", "fill", "impulse",
+    "points", "element_of_point", "soil_of_point", "initial_volume", "nodes", "sums", "contents", "impulse",
     "clamps", "ledger", "lining_displacement", "lining_velocity", "lining_impulse",
 )  # fmt: skip
 #: Numbers: simulated time [s], counters, grains taken out [kg/m], speed of the fast wave and that which gives

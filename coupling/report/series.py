@@ -31,7 +31,7 @@ def choose_frames(run):
 
 
 def model_names(run, tunnel=None):
-    """Names of the lining models that have answered for a tunnel, None: that with the gate; the leading one first."""
+    """Lining models by their users' names that answered for a tunnel (None: that with the gate), the leading first."""
     home = structure_group("", tunnel).rstrip("/")
     answered = run[home].children if home in run.children else {}
     return [str(response.attrs.get("model", group)) for group, response in answered.items()]

@@ -4,32 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from mpm.meshing import crossed
+
 SOIL, EMPTY = 0, 3
-
-
-def crossed(nodes, quadrilaterals):
-    """Cut quadrilaterals by both diagonals into four triangles each, about a node where these meet.
-
-    Parameters
-    ----------
-    nodes : (n, 2) float64
-    quadrilaterals : (m, 4) int
-        Corners, counter-clockwise.
-
-    Returns
-    -------
-    nodes : (n + m, 2) float64
-    elements : (4 m, 3) int32
-        4 q + k is (corner k, corner k + 1, centre) of quadrilateral q.
-    """
-    a, b, c, d = (nodes[quadrilaterals[:, k]] for k in range(4))
-    along, across, gap = c - a, d - b, b - a
-    share = (gap[:, 0] * across[:, 1] - gap[:, 1] * across[:, 0]) / (
-        along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]
-    )
-    centre = np.broadcast_to(len(nodes) + np.arange(len(a))[:, None], (len(a), 4))
-    elements = np.stack([quadrilaterals, np.roll(quadrilaterals, -1, axis=1), centre], axis=2)
-    return np.concatenate([nodes, a + share[:, None] * along]), elements.reshape(-1, 3).astype(np.int32)
 
 
 def box_mesh(x, y, filled=None, fixed_bottom=True):
@@ -56,6 +33,7 @@ def box_mesh(x, y, filled=None, fixed_bottom=True):
     j, i = np.divmod(np.arange(columns * rows), columns)
     a = j * (columns + 1) + i
     nodes, elements = crossed(nodes, np.column_stack([a, a + 1, a + columns + 2, a + columns + 1]))
+    elements = elements.astype(np.int32)
     cx, cy = nodes[elements].mean(axis=1).T
     inside = cy < 0 if filled is None else np.asarray(filled(cx, cy), bool)
     none = np.zeros(0, np.int32)
@@ -91,7 +69,8 @@ def annulus_mesh(radii, sectors):
     corners = np.column_stack([radii[ring] * np.sin(angle), -radii[ring] * np.cos(angle)])
     corners[np.abs(corners) < 1e-12 * radii[-1]] = 0.0
     # the map turns the sense of the corners
-    mesh.nodes, mesh.elements = crossed(corners, mesh.elements[:, 0].reshape(-1, 4)[:, ::-1])
+    mesh.nodes, elements = crossed(corners, mesh.elements[:, 0].reshape(-1, 4)[:, ::-1])
+    mesh.elements = elements.astype(np.int32)
     mesh.inner = np.flatnonzero(ring == 0)
     mesh.outer = np.flatnonzero(ring == rings - 1)
     mesh.on_axis, mesh.right, mesh.top = mesh.right, mesh.right[:0], mesh.right[:0]
