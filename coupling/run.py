@@ -214,7 +214,7 @@ def respond(scene: Scene, pressures: xr.Dataset, backend: str = "beam-spring", t
     return respond_by_name(ring, pressures, backend)
 
 
-def gate_tunnel(scene):
+def gate_tunnel(scene: Scene) -> int:
     """Number of the tunnel with the gate, 0 without one."""
     return scene.mpm.gate.tunnel if scene.mpm.gate else 0
 
