@@ -177,7 +177,7 @@ def finish(
             write_quality(folder / RUN_FILE, answer)
             respond_beside(scene, folder)
         except (RunRefused, LiningFailure) as problem:
-            log.error("ring: %s", problem)
+            log.error("no response of the ring: %s", problem)
             failure = problem
     pictures = []
     if figures:
