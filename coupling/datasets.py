@@ -557,7 +557,7 @@ def _group_names(file):
         return names
 
 
-def stored_title(path):
+def stored_title(path: str | Path) -> str:
     """Title of a netCDF-4 file, by which its kind is known; empty where there is no such file or it has none."""
     try:
         return str(_read(Path(path), None).attrs.get("title", ""))

@@ -42,7 +42,7 @@ class RecordedSimulation:
         self.scene, self.folder, self.report, self.threads = scene, folder, report, threads
         self.checkpoint_interval, self.remains = checkpoint_interval, remains
         self.attributes = root_attributes(scene)
-        self.writer = self.simulation = None
+        self.writer = self.simulation = self._initial = None
         self._used_before = {"wall_seconds": 0.0, "cpu_seconds": 0.0}
         self._begin = clock.monotonic(), clock.process_time()
 
@@ -121,8 +121,7 @@ class RecordedSimulation:
             )
         if about is None:
             remove_checkpoints(self.folder)
-            self._append(self.simulation.begin())
-            self._store()
+            self._initial = self.simulation.begin()
         else:
             self.simulation.restore(state)
             self._used_before = {name: about[name] for name in self._used_before}
@@ -136,6 +135,9 @@ class RecordedSimulation:
             def pause():
                 return stop.asked is not None or clock.monotonic() >= due
 
+            if self._initial is not None:
+                self._append(self._initial)
+                self._store()
             while not simulation.done:
                 record = simulation.advance(pause)
                 if record is not None:

@@ -182,7 +182,7 @@ def finish(
             write_quality(folder / RUN_FILE, answer)
             respond_beside(scene, folder)
         except (RunRefused, LiningFailure) as problem:
-            log.error("ring: %s", problem)
+            log.error("no response of the ring: %s", problem)
             failure = problem
     pictures = []
     if figures:
@@ -219,7 +219,7 @@ def respond(scene: Scene, pressures: xr.Dataset, backend: str = "beam-spring", t
     return respond_by_name(ring, pressures, backend)
 
 
-def gate_tunnel(scene):
+def gate_tunnel(scene: Scene) -> int:
     """Number of the tunnel with the gate, 0 without one."""
     return scene.mpm.gate.tunnel if scene.mpm.gate else 0
 

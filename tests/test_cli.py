@@ -134,7 +134,7 @@ def test_ring_that_fails_leaves_the_pictures_of_the_ground_and_says_what_failed(
     assert result.exit_code == 3
     assert "ring: no equilibrium" in result.output and "the ground is computed and drawn" in result.output
     assert "ring: no equilibrium" in (tmp_path / "a" / "run.log").read_text()
-    whole = gush("run", "quick", "--out", tmp_path / "b", "--no-figures")
+    whole = gush("run", "quick", "--out", tmp_path / "b", "--no-figures", "--no-response")
     assert whole.exit_code == 0
     drawn, of_ground = (sorted(path.name for path in place) for place in (
         (tmp_path / "a" / "figures").iterdir(), draw_run(tmp_path / "b", tmp_path / "b" / "figures")))  # fmt: skip
