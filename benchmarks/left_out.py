@@ -31,20 +31,20 @@ def variants(scene):
     elastic = tuple(soil.model_copy(update={"model": "elastic"}) for soil in scene.soils)
     tight = tuple(soil.model_copy(update={"hydraulic_conductivity": 1e-12}) for soil in scene.soils)
     smooth = tuple(tunnel.model_copy(update={"friction_coefficient": 0.0}) for tunnel in scene.tunnels)
-    plain = scene.numerics.model_copy(update={"volumetric_smoothing": False})
-    solved = scene.numerics.model_copy(update={"remapping": False})
+    unfiltered = scene.numerics.model_copy(update={"pressure_filter": 0.0})
+    undamped = scene.numerics.model_copy(update={"stress_damping": 0.0})
     tied = scene.water.model_copy(update={"drainage": "undrained"})
     crown = {"gate": scene.gate.model_copy(update={"angle": 0.0})}
 
     def without(**changes):
         return scene.model_copy(update=changes)
 
-    yield FULL, "nothing: two phases, Mohr-Coulomb, friction, smoothing, filter", FULL, scene
+    yield FULL, "nothing: two phases, Mohr-Coulomb, friction, filter, damping", FULL, scene
     yield "dry", "the water: compiled out", FULL, without(water=None)
     yield "elastic", "the return mapping: compiled out", FULL, without(soils=elastic)
     yield "dry, elastic", "both", FULL, without(water=None, soils=elastic)
-    yield "no smoothing", "mean volume changes: compiled out of the points' update", FULL, without(numerics=plain)
-    yield "no remapping", "the second map to the nodes (USL): compiled out", FULL, without(numerics=solved)
+    yield "no filter", "the pressure that nodes feel: not asked for", FULL, without(numerics=unfiltered)
+    yield "no damping", "what stress runs ahead by: not summed; longer steps", FULL, without(numerics=undamped)
     yield "frictionless", "nothing: contacts with a coefficient of 0", FULL, without(tunnels=smooth)
     yield TIGHT, "nothing: both velocities", FULL, without(soils=tight)
     yield "undrained", "velocity and momentum of the water, drag: compiled out", TIGHT, without(water=tied)
@@ -150,10 +150,8 @@ def main():
         "",
         f"Frictionless linings compile nothing away: {contacts} of {nodes} nodes touch a lining, and what they cost is "
         'in the noise. Drag is implicit, so tight ground takes the time step of sand and `drainage = "undrained"` '
-        "changes only the work of a step. Without smoothing the nodal means are still summed, since the pressure's "
-        "projection needs them. Without remapping the second map is saved, but nodes that points hardly touch shorten "
-        "the steps of the finest levels, which cost more a point. A dry scene keeps the water's columns: a point is "
-        "two cache lines, whatever it holds.",
+        "changes only the work of a step. A dry scene keeps the water's columns: a point is two cache lines, whatever "
+        "it holds.",
         "",
         "Levels follow the mesh, so steps of two meshes do not compare one by one: with a sink the finest level holds "
         f"fewer points and takes a shorter step ({1e6 * by_name['sink']['dt']:.0f} us, {by_name['sink']['levels']} "

@@ -46,7 +46,7 @@ def pressures(scene, n_times):
     fall = share * np.exp(-(((base["theta"] - GATE[0]) / 15) ** 2))
     loads = base.isel(time=0, drop=True).map(lambda part: (part * (1 - fall)).transpose("time", "theta"))
     loads = loads.assign_coords(time=("time", np.arange(n_times, dtype=float), {"units": "s"}))
-    loads["inflow_mass"] = ("time", np.linspace(0, 1000, n_times), {"units": "kg m-1"})
+    loads["inflow_mass"] = ("time", np.linspace(0, 1000, n_times), {"units": "kg/m"})
     return loads
 
 
@@ -97,7 +97,7 @@ def open_gate(scene):
     lines = ["| cut | pressures | N | Q | M | radial displacement | joint rotation |", "|---" * 7 + "|"]
     for cut in (0.05, 1 / 6, 0.5, 0.9, 1.0):
         try:
-            hole = ContinuumLining(scene.ring, opening=(*GATE, cut)).respond(loads)
+            hole = ContinuumLining(scene.ring, gate=(*GATE, cut)).respond(loads)
         except LiningFailure as failure:
             lines.append(f"| {cut:.2f} | initial | {failure} | | | | |")
             continue

@@ -5,9 +5,9 @@ import json
 import matplotlib
 import numpy as np
 from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
 
 from coupling.figures import GATE, INITIAL, NOW, SECOND, STYLE
+from coupling.picture import Picture
 from structure.checks import UTILISATIONS
 
 COLOURS = {
@@ -31,7 +31,7 @@ def checks(checked):
         raise ValueError("checks: the dataset must come from structure.check(response, limits), got a plain response")
     with_section = "section_utilisation" in checked
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.4 if with_section else 4.2, 3.6), layout="constrained")
+        figure = Picture(figsize=(7.4 if with_section else 4.2, 3.6), layout="constrained")
         axes = np.atleast_1d(figure.subplots(1, 2 if with_section else 1))
         if with_section:
             _diagram(figure, axes[0], checked)

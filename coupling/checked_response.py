@@ -1,9 +1,5 @@
 """A response held against the limits of a file, for the command line: variables, largest utilisations, a picture."""
 
-import tomllib
-
-from pydantic import ValidationError
-
 from coupling.run_folder import FIGURES, RunRefused
 
 
@@ -13,7 +9,9 @@ def read_limits(path):
     Raises
     ------
     RunRefused
-        Not readable, no TOML, or no limits: which key, rule, value.
+        Not readable.
+    structure.InputError
+        No TOML, or no limits: every mistake with key, rule, value and remedy.
     """
     from structure import Limits
 
@@ -21,15 +19,6 @@ def read_limits(path):
         return Limits.from_toml(path)
     except OSError as problem:
         raise RunRefused(f"limits '{path}': cannot be read: {problem.strerror}; give a TOML file") from problem
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
-        raise RunRefused(f"limits '{path}': must be valid TOML, got: {problem}") from problem
-    except ValidationError as problem:
-        lines = [
-            f"{'.'.join(map(str, item['loc'])) or 'limits'}: {item['msg'].removeprefix('Value error, ')}"
-            + (f", got {item['input']!r}" if isinstance(item["input"], int | float | str) else "")
-            for item in problem.errors()
-        ]
-        raise RunRefused(f"limits '{path}': " + "; ".join(lines)) from problem
 
 
 def with_checks(response, limits):

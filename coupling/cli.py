@@ -5,7 +5,6 @@ commands.
 """
 
 import contextlib
-import time as clock
 from pathlib import Path
 from typing import Annotated
 
@@ -16,6 +15,7 @@ from rich.table import Table
 from coupling.events import EventStream
 from coupling.exit_codes import DIFFERENT, JsonPath, checked_json, failures, told_warnings, warn, write_json
 from coupling.measure_commands import accuracy_command, bench_command, stability_command, study_command
+from coupling.progress_line import ProgressLine, duration
 from coupling.published.command import figures_command, published_command
 from coupling.result_commands import export_command, info_command, report_command
 
@@ -72,7 +72,8 @@ def run_command(
         float, typer.Option(min=0.0, help="Seconds between checkpoints, from which --resume goes on.")
     ] = 60.0,
     threads: Threads = None,
-    no_figures: Annotated[bool, typer.Option("--no-figures", help="No ring response, no pictures.")] = False,
+    no_figures: Annotated[bool, typer.Option("--no-figures", help="No pictures.")] = False,
+    no_response: Annotated[bool, typer.Option("--no-response", help="No forces in the ring.")] = False,
     json_path: JsonPath = None,
     events: Annotated[
         Path | None, typer.Option("--events", help="Also write what happens as JSON lines while it does; - prints.")
@@ -98,7 +99,7 @@ def run_command(
         with ProgressLine(quiet) as line:
             pressures = run(
                 loaded, out, overwrite, stream.following(line), threads, not no_figures, resume, checkpoint_interval,
-                warn=stream.warning(warn),
+                warn=stream.warning(warn), response=not no_response,
             )  # fmt: skip
         folder = Path(pressures.attrs["run"])
         data = {"run": str(folder), **summarise_run(folder), "response": None}
@@ -169,14 +170,15 @@ def plan_command(
     """
     with failures(), checked_json(json_path):
         from coupling.plan import plan, rough_plan
-        from coupling.plausibility import warnings_of
         from coupling.scene import load_scene, parse_changes
 
-        loaded = load_scene(scene, **parse_changes(changes or []))
-        warnings = warnings_of(loaded)
-        for warning in warnings:
-            warn(warning)
-        data = {**(rough_plan(loaded) if rough else plan(loaded, threads)), "warnings": warnings}
+        loaded, told = load_scene(scene, **parse_changes(changes or [])), []
+
+        def tell(message):
+            told.append(message)
+            warn(message)
+
+        data = {**(rough_plan if rough else plan)(loaded, threads, tell), "warnings": told}
         write_json(json_path, data)
         if str(json_path) != "-":
             console = Console()
@@ -332,58 +334,6 @@ def main():
     app()
 
 
-class ProgressLine:
-    """The live line of a run, on a terminal only; callable with the solver's progress dicts.
-
-    Parameters
-    ----------
-    quiet : bool
-    """
-
-    def __init__(self, quiet=False):
-        self._begin = None
-        self._console = Console(stderr=True)
-        self._status = None
-        if self._console.is_terminal and not quiet:
-            self._status = self._console.status("starting")
-
-    def __enter__(self):
-        if self._status is not None:
-            self._status.start()
-        return self
-
-    def __exit__(self, *_):
-        if self._status is not None:
-            self._status.stop()
-
-    def __call__(self, state):
-        """Show one progress dict of `mpm.simulate`."""
-        if self._status is not None:
-            self._status.update(self.text(state), spinner_style="blue")
-
-    def text(self, state):
-        """The line for one progress dict."""
-        stage = state["stage"]
-        if stage == "relax":
-            return f"initial equilibrium: step {state['step']}, residual {state['residual']:.1e}"
-        if stage != "gush":
-            return {"mesh": "meshing", "respond": "ring response", "figures": "pictures"}.get(stage, stage)
-        if self._begin is None:
-            self._begin = clock.monotonic(), state["share"]
-        return (
-            f"t {state['time']:.3f} s  inflow {state['inflow_mass']:.0f} kg/m  "
-            f"dt {1e6 * state['dt']:.0f} µs ({state['dt_limit']})  "
-            f"{state['point_steps_per_second'] / 1e6:.1f} M point-steps/s  {self._left(state)} left"
-        )
-
-    def _left(self, state):
-        begin, share_before = self._begin
-        share, elapsed = min(state["share"], 1.0), clock.monotonic() - begin
-        if share - share_before < 0.01 or elapsed < 1.0:
-            return "?"
-        return _duration(elapsed * (1 - share) / (share - share_before))
-
-
 def _scene_row(scene):
     gate = scene.gate
     return {
@@ -436,7 +386,10 @@ def _response_table(data, tunnel=None):
                     for state in ("initial", "final")
                 ),
             )
-    for name, label in (("joint_opening", "joint opening [mm]"), ("joint_rotation", "joint rotation [mrad]")):
+    for name, label in (
+        ("joint_opening", "joint opening (+) or closing (-) [mm]"),
+        ("joint_rotation", "joint rotation [mrad]"),
+    ):
         if data[name]["final"]:
             cells = (" ".join(f"{1e3 * value:.2f}" for value in data[name][state]) for state in ("initial", "final"))
             table.add_row(label.replace("[", "\\["), *cells)
@@ -468,7 +421,7 @@ def _feature_table(data):
 
 
 def _cost_table(data):
-    most = "no stop time given" if data["steps_at_most"] is None else f"at most {data['steps_at_most']}"
+    most = "no stop time given" if data["steps_at_most"] is None else f"{data['steps_at_most']} until the stop time"
     table = Table("cost", "", title=f"{data['scene']}: what it costs")
     free = data["free_memory_bytes"]
     meshed = "nodes" in data
@@ -488,15 +441,8 @@ def _cost_table(data):
         table.add_row(*row)
     if meshed:
         table.add_row("speed measured now", f"{data['point_steps_per_second'] / 1e6:.1f} M point-steps/s")
-        table.add_row("time of stepping", f"about {_duration(data['expected_seconds'])}")
+        table.add_row("time of stepping", f"about {duration(data['expected_seconds'])}")
     return table
-
-
-def _duration(seconds):
-    """Seconds as people say them."""
-    if seconds < 90:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
 
 
 if __name__ == "__main__":

@@ -57,7 +57,7 @@ def compare(source, first="beam-spring", second="continuum", open_gate=None):
     first, second : str
         Lining models, see :func:`structure.lining_model`; a class in a file goes by the name of the class.
     open_gate : float, optional
-        Cut the gate's opening out of the ring of "continuum" over this share of the tunnel's length; its angle and
+        Cut the gate out of the ring of "continuum" over this share of the tunnel's length; its angle and
         width come from the pressures' attributes.
 
     Returns
@@ -171,7 +171,7 @@ def _gate_options(source, cut):
             f"'{source.file}': an open gate needs the attributes gate_angle [degree] and gate_width [m] of the"
             " pressures, got none; leave --open-gate out"
         )
-    return {"opening": (float(attributes["gate_angle"]), float(attributes["gate_width"]), cut)}
+    return {"gate": (float(attributes["gate_angle"]), float(attributes["gate_width"]), cut)}
 
 
 def _differences(first, second, ring):

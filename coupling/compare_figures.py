@@ -2,10 +2,10 @@
 
 import matplotlib
 import numpy as np
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from coupling.figures import STYLE, _closed, _crown_up, _legend_below, _moment, _radial_ticks
+from coupling.picture import Picture
 
 COLOURS, DASHES = ("0.25", "#c1272d"), ("-", (0, (4, 2)))
 MOST_JOINTS_NAMED = 8
@@ -15,7 +15,7 @@ PANELS = (
     ("bending_moment", "bending moment M [kN m/m]"),
 )
 JOINTS = (
-    ("joint_opening", "opening [mm]"),
+    ("joint_opening", "opening (+) or closing (\N{MINUS SIGN}) [mm]"),
     ("joint_dislocation", "dislocation [mm]"),
     ("joint_rotation", "rotation [mrad]"),
 )
@@ -32,7 +32,7 @@ def forces_compared(responses):
     one = next(iter(responses.values()))
     times = [0, -1] if one.sizes["time"] > 1 else [0]
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.4, 3.0 * len(times) + 0.2), layout="constrained")
+        figure = Picture(figsize=(7.4, 3.0 * len(times) + 0.2), layout="constrained")
         axes = figure.subplots(len(times), 3, subplot_kw={"projection": "polar"}, squeeze=False)
         for row, time in zip(axes, times, strict=True):
             for axis, (name, title) in zip(row, PANELS, strict=True):
@@ -73,7 +73,7 @@ def joints_compared(responses):
     joints = one["joint"].values
     colours = matplotlib.colormaps["viridis"](np.linspace(0, 0.9, len(joints)))
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.4, 3.2), layout="constrained")
+        figure = Picture(figsize=(7.4, 3.2), layout="constrained")
         axes = figure.subplots(1, 3)
         for axis, (name, title) in zip(axes, JOINTS, strict=True):
             for response, dash in zip(responses.values(), DASHES, strict=False):

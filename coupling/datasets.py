@@ -1,19 +1,24 @@
 """The run file: its schema, the writer that appends while a run goes on, and readers with clear errors.
 
 One netCDF-4 file a run, SI units, angles in degrees from the crown, clockwise. Groups: `/lining` (pressures on a
-uniform theta grid), `/history` (inflow, zones, balances, time step), `/points` (snapshots), `/mesh`, and
+uniform theta grid), `/history` (inflow, zones, balances, time step), `/points` (snapshots), `/mesh` (UGRID), and
 `/structure/<model>` (responses; those of tunnels without the gate in `/structure_tunnel_<k>/<model>`). The root
 carries attributes only: provenance and `status`.
 """
+
+from __future__ import annotations
 
 import contextlib
 import hashlib
 import io
 import math
 import os
+import re
 import shutil
 import time as clock
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,9 +26,18 @@ from coupling.journal import changed, put_in_place, readable, recover, replace_f
 from coupling.netcdf_group import read_group_at_once
 from coupling.own_content import ForeignContent, require_own_content
 from coupling.provenance import with_history
+from coupling.run_folder import RUN_FILE, how_to_go_on, in_use
 from mpm.variables import CLAMPS, POINT_VARIABLES
 
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    from mpm.scene import Scene as MpmScene
+
 STATUSES = ("running", "finished", "failed", "interrupted")
+AXES = {"time": "T", "x": "X", "y": "Y"}
+INFLOW = "inflow_mass"  # a coordinate along time, beside the time itself
 DT_LIMITS = ("acoustic", "advective", "output", "other")
 SECONDS_BETWEEN_WRITES = 1.0
 #: HDF5 format with checksums on its structure, read by netCDF-C too; those of the data are asked for by each variable.
@@ -44,15 +58,15 @@ MOTION = {
 }
 #: And for elastic ones: the ring's own forces, per metre of tunnel.
 RING_FORCES = {
-    "axial_force": ("N m-1", "axial force of the elastic lining, compression positive"),
-    "shear_force": ("N m-1", "shear force of the elastic lining, -dM/ds"),
-    "bending_moment": ("N", "bending moment of the elastic lining, tension on the outer face positive"),
+    "axial_force": ("N/m", "axial force of the elastic lining, compression positive"),
+    "shear_force": ("N/m", "shear force of the elastic lining, -dM/ds"),
+    "bending_moment": ("N m/m", "bending moment of the elastic lining, tension on the outer face positive"),
 }
 #: Variables on (time,) that `/lining` repeats from `/history`, so that pressures can be compared at equal inflow.
 PROGRESS = {
-    "inflow_mass": ("kg m-1", "grains inside the tunnel, per metre of tunnel"),
-    "flow_zone_area": ("m2", "area of soil displaced by more than 50 mm"),
-    "disturbed_area": ("m2", "area of soil displaced by 10 to 50 mm"),
+    "inflow_mass": ("kg/m", "grains inside the tunnel, per metre of tunnel"),
+    "flow_zone_area": ("m^2", "area of soil displaced by more than 50 mm"),
+    "disturbed_area": ("m^2", "area of soil displaced by 10 to 50 mm"),
 }
 #: Errors, largest so far: see :func:`mpm.errors.errors`.
 ERRORS = {
@@ -67,35 +81,35 @@ ERRORS = {
 }
 #: What they come from, and the balances: see :meth:`mpm.Solver.balances`.
 BALANCES = {
-    "momentum_departure": ("N s m-1", "momentum of the points less what the nodes received, size"),
-    "flow_momentum": ("N s m-1", "sum of the sizes of the momenta of grains and water in the flow zone"),
-    "water_missing": ("kg m-1", "water at the start less that now"),
-    "water_inflow": ("kg m-1", "water that came through the outer face of the gate, that taken out included"),
-    "flow_water": ("kg m-1", "water of the flow zone"),
-    "work_gravity": ("J m-1", "work of gravity on grains and water since the gate opened"),
-    "work_stress": ("J m-1", "work of stresses and pore pressure since the gate opened, positive where it accelerates"),
-    "work_drag": ("J m-1", "work of the drag between water and grains since the gate opened"),
-    "kinetic_energy_change": ("J m-1", "change of the kinetic energy of grains and water since the gate opened"),
-    "transfer_loss": ("J m-1", "kinetic energy lost between points and nodes since the gate opened"),
-    "flow_energy": ("J m-1", "kinetic energy of grains and water in the flow zone"),
-    "material_volume": ("m2", "area of all material in the mesh"),
-    "flow_volume": ("m2", "area of the material of the flow zone in the mesh"),
-    "overlap_volume": ("m2", "area of material that cells hold beyond their own"),
-    "flow_overlap_volume": ("m2", "the flow zone's part of the area of material that cells hold beyond their own"),
+    "momentum_departure": ("N s/m", "momentum of the points less what the nodes received, size"),
+    "flow_momentum": ("N s/m", "sum of the sizes of the momenta of grains and water in the flow zone"),
+    "water_missing": ("kg/m", "water at the start less that now"),
+    "water_inflow": ("kg/m", "water that came through the outer face of the gate, that taken out included"),
+    "flow_water": ("kg/m", "water of the flow zone"),
+    "work_gravity": ("J/m", "work of gravity on grains and water since the gate opened"),
+    "work_stress": ("J/m", "work of stresses and pore pressure since the gate opened, positive where it accelerates"),
+    "work_drag": ("J/m", "work of the drag between water and grains since the gate opened"),
+    "kinetic_energy_change": ("J/m", "change of the kinetic energy of grains and water since the gate opened"),
+    "transfer_loss": ("J/m", "kinetic energy lost between points and nodes since the gate opened"),
+    "flow_energy": ("J/m", "kinetic energy of grains and water in the flow zone"),
+    "material_volume": ("m^2", "area of all material in the mesh"),
+    "flow_volume": ("m^2", "area of the material of the flow zone in the mesh"),
+    "overlap_volume": ("m^2", "area of material that cells hold beyond their own"),
+    "flow_overlap_volume": ("m^2", "the flow zone's part of the area of material that cells hold beyond their own"),
     "contact_error": ("1", "momentum at the lining that the recorded reactions do not explain, over their sum"),
     "largest_courant": ("1", "largest time step so far over the critical one of the state it led to"),
 }
 #: Variables on (time,) of `/history`.
 HISTORY = {
     **PROGRESS,
-    "grain_mass": ("kg m-1", "mass of all grains, those taken out included; constant"),
+    "grain_mass": ("kg/m", "mass of all grains, those taken out included; constant"),
     "suspended_fraction": ("1", "share of points whose grains do not touch"),
     "tip_fraction": (
         "1",
         "share of points at the tip of the Mohr-Coulomb cone: grains touch, unpressed, and bear nothing",
     ),
-    "kinetic_energy": ("J m-1", "kinetic energy of the grains"),
-    "max_velocity": ("m s-1", "largest velocity of the grains"),
+    "kinetic_energy": ("J/m", "kinetic energy of the grains"),
+    "max_velocity": ("m/s", "largest velocity of the grains"),
     **ERRORS,
     **BALANCES,
     "dt": ("s", "mean time step in the interval"),
@@ -111,7 +125,7 @@ POINTS = {
     **{name: (unit, meaning) for name, unit, meaning in POINT_VARIABLES if not name.endswith("_initial")},
     "displacement_x": ("m", "horizontal displacement since the start"),
     "displacement_y": ("m", "vertical displacement since the start, upward positive"),
-    "volume": ("m2", "area that the point stands for, per metre of tunnel"),
+    "volume": ("m^2", "area that the point stands for, per metre of tunnel"),
     "soil": ("1", "number of the soil layer, from 0"),
 }
 
@@ -123,17 +137,17 @@ class RunFileError(ValueError):
 # -- the theta grid -------------------------------------------------------------------------------
 
 
-def cell_centres():
+def cell_centres() -> NDArray[np.float64]:
     """Centres of the 360 one-degree cells: 0, 1, .. 359 [degree]."""
     return np.arange(360.0)
 
 
-def cell_bounds():
+def cell_bounds() -> NDArray[np.float64]:
     """Lower and upper bound of every cell, (360, 2) float64 [degree]; the first is -0.5 .. 0.5."""
     return cell_centres()[:, None] + np.array([-0.5, 0.5])
 
 
-def cell_mean_weights(theta):
+def cell_mean_weights(theta: NDArray[np.float64]) -> NDArray[np.float64]:
     """Weights that turn nodal values into cell means of their piecewise linear periodic interpolation.
 
     The interpolation is integrated exactly over every cell, so the integral around the ring is kept.
@@ -263,7 +277,8 @@ class RunWriter:
             space = ("tunnel", "theta") if self._n_tunnels > 1 else ("theta",)
             lining = self._create_group(file, "lining", geometry)
             if self._n_tunnels > 0:
-                lining.dimensions.update({"theta": 360, "bound": 2})
+                lining.dimensions.update({"theta": 360, "bounds": 2})
+                lining.attrs["coordinates"] = "theta_bnds"
                 if self._n_tunnels > 1:
                     lining.dimensions["tunnel"] = self._n_tunnels
                     _variable(lining, "tunnel", ("tunnel",), "i4", ("1", "tunnel, counted from 0"))[:] = np.arange(
@@ -272,7 +287,7 @@ class RunWriter:
                 theta = _variable(lining, "theta", ("theta",), "f8", ("degree", "angle from the crown, clockwise"))
                 theta[:] = cell_centres()
                 theta.attrs["bounds"] = "theta_bnds"
-                lining.create_variable("theta_bnds", ("theta", "bound"), "f8", fletcher32=True)[:] = cell_bounds()
+                lining.create_variable("theta_bnds", ("theta", "bounds"), "f8", fletcher32=True)[:] = cell_bounds()
                 shape = (16, *([self._n_tunnels] if self._n_tunnels > 1 else []), 360)
                 for name, meaning in self._on_theta.items():
                     variable = _variable(lining, name, ("time", *space), "f8", meaning, shape)
@@ -286,6 +301,10 @@ class RunWriter:
                 _variable(history, name, ("time",), kind, meaning, (256,))
             history["dt_limit"].attrs["flag_values"] = np.arange(len(DT_LIMITS), dtype="i1")
             history["dt_limit"].attrs["flag_meanings"] = " ".join(DT_LIMITS)
+            for group in (lining, history):
+                for variable in group.variables.values():
+                    if variable.dimensions[0] == "time" and variable.name.rpartition("/")[2] not in ("time", INFLOW):
+                        variable.attrs["coordinates"] = INFLOW
             points = self._create_group(file, "points", geometry)
             points.attrs["comment"] = "values of one time are in no particular order; padded with NaN"
             if mesh is not None:
@@ -355,7 +374,7 @@ class RunWriter:
         group["time"][rows] = [record.time for record in snapshots]
 
 
-def geometry_attributes(scene):
+def geometry_attributes(scene: MpmScene) -> dict[str, Any]:
     """Tunnels and gate as attributes [m, degree], for figures that read datasets only."""
     attributes = {}
     if scene.tunnels:
@@ -374,27 +393,36 @@ def geometry_attributes(scene):
     return attributes
 
 
-def write_attributes(path, **attributes):
+def write_attributes(path: str | Path, **attributes: Any) -> None:
     """Set root attributes of a run file."""
     with _append_to(path) as file:
         for name, value in attributes.items():
             file.attrs[name] = value
 
 
-def structure_group(model, tunnel=None):
+def structure_group(model: str, tunnel: int | None = None) -> str:
     """Group of a response: `structure/<model>` for the tunnel with the gate, `structure_tunnel_<k>/<model>` for others.
+
+    The model's name is made an identifier, so that it can be an attribute of a tree: "beam-spring" is `beam_spring`.
 
     tunnel : int or None, None: the one with the gate.
     """
-    return f"structure/{model}" if tunnel is None else f"structure_tunnel_{tunnel}/{model}"
+    return f"{'structure' if tunnel is None else f'structure_tunnel_{tunnel}'}/{identifier(model)}"
 
 
-def write_response(path, response, model="beam-spring", tunnel=None):
+def identifier(name: str) -> str:
+    """A name as an identifier: every character that it may not have becomes `_`."""
+    return re.sub(r"\W|^(?=\d)", "_", name)
+
+
+def write_response(
+    path: str | Path, response: xr.Dataset, model: str = "beam-spring", tunnel: int | None = None
+) -> None:
     """Write the response of a lining model to its :func:`structure_group`, in place of an earlier one, as a whole."""
     import h5py
 
     group = structure_group(model, tunnel)
-
+    response = response.assign_attrs(model=model)
     path = Path(path).resolve()
     recover(path)
     beside = path.with_name(f"{path.name}.tmp")
@@ -402,15 +430,16 @@ def write_response(path, response, model="beam-spring", tunnel=None):
         shutil.copy(path, beside)
         with _damage_named(path):
             with h5py.File(beside, "a", locking=False, libver=CHECKED_FORMAT) as file:
-                if group in file:
-                    del file[group]
+                for name in (group, group.partition("/")[0] + f"/{model}"):  # the latter in files of earlier versions
+                    if name in file:
+                        del file[name]
             write_dataset(beside, response, group)
         put_in_place(beside, path)
     finally:
         beside.unlink(missing_ok=True)
 
 
-def write_dataset(path, dataset, group=None):
+def write_dataset(path: str | Path, dataset: xr.Dataset, group: str | None = None) -> None:
     """Write a dataset with checksums: into a new file, or as a group more into one whose history gets a line."""
     import h5netcdf
     from xarray.backends import H5NetCDFStore
@@ -420,6 +449,9 @@ def write_dataset(path, dataset, group=None):
     encoding = {
         name: {"fletcher32": variable.ndim > 0, "_FillValue": None} for name, variable in dataset.variables.items()
     }
+    if "time" in dataset.coords:
+        dataset = dataset.assign_coords(time=dataset["time"].copy())
+        dataset["time"].attrs.pop("axis", None)
     with H5NetCDFStore.open(path, mode=mode, group=group, **options) as store:
         dataset.dump_to_store(store, encoding=encoding)
     if group is not None:
@@ -430,13 +462,22 @@ def write_dataset(path, dataset, group=None):
 def _write_mesh(group, mesh, geometry):
     for key, value in geometry.items():
         group.attrs[key] = value
+    group.attrs["Conventions"], group.attrs["coordinates"] = "CF-1.11 UGRID-1.0", "x y"
     group.dimensions.update({"node": len(mesh.nodes), "element": len(mesh.elements), "corner": 3})
-    _variable(group, "x", ("node",), "f8", ("m", "horizontal position of the node"))[:] = mesh.nodes[:, 0]
-    _variable(group, "y", ("node",), "f8", ("m", "vertical position of the node"))[:] = mesh.nodes[:, 1]
+    topology = group.create_variable("topology", (), "i4")
+    topology.attrs.update({
+        "cf_role": "mesh_topology", "long_name": "triangles of the mesh", "topology_dimension": np.int32(2),
+        "node_coordinates": "x y", "face_node_connectivity": "element_nodes", "face_dimension": "element",
+    })  # fmt: skip
+    for axis, name, k in (("horizontal", "x", 0), ("vertical", "y", 1)):
+        node = _variable(group, name, ("node",), "f8", ("m", f"{axis} position of the node"))
+        node[:] = mesh.nodes[:, k]
     corners = _variable(group, "element_nodes", ("element", "corner"), "i4", ("1", "nodes, counter-clockwise, from 0"))
     corners[:] = mesh.elements
+    corners.attrs["cf_role"], corners.attrs["start_index"] = "face_node_connectivity", np.int32(0)
     region = _variable(group, "region", ("element",), "i1", ("1", "part of the mesh"))
     region[:] = mesh.region
+    region.attrs["mesh"], region.attrs["location"] = "topology", "face"
     region.attrs["flag_values"] = np.arange(4, dtype="i1")
     region.attrs["flag_meanings"] = "soil channel interior headroom"
 
@@ -479,7 +520,7 @@ def _limit_flag(name):
 # -- reading --------------------------------------------------------------------------------------
 
 
-def run_file(path):
+def run_file(path: str | Path) -> Path:
     """The run file for a run folder or a file; raises `RunFileError` when there is none."""
     path = Path(path)
     file = path / "run.nc" if path.is_dir() else path
@@ -489,7 +530,7 @@ def run_file(path):
     return file
 
 
-def read_run(path):
+def read_run(path: str | Path) -> xr.DataTree:
     """All groups of a run as an `xarray.DataTree`, in memory; groups as in the module's description."""
     import xarray as xr
 
@@ -498,7 +539,8 @@ def read_run(path):
         names = _group_names(file)
     except Exception as error:
         raise RunFileError(_why_unreadable(file, None, error)) from error
-    return xr.DataTree.from_dict({"/": _read(file, None), **{f"/{name}": _read(file, name) for name in names}})
+    shown = {name: "/".join(map(identifier, name.split("/"))) for name in names}
+    return xr.DataTree.from_dict({"/": _read(file, None), **{f"/{shown[name]}": _read(file, name) for name in names}})
 
 
 def _group_names(file):
@@ -509,7 +551,10 @@ def _group_names(file):
     with _shown(file) as shown, h5netcdf.File(shown, "r") as content:
         answered = [name for name in content.groups if name.startswith("structure")]
         names = [name for name in content.groups if name not in answered]
-        return names + [f"{name}/{model}" for name in answered for model in in_order(content[name].groups)]
+        for name in answered:
+            models = {str(group.attrs.get("model", key)): key for key, group in content[name].groups.items()}
+            names += [f"{name}/{models[model]}" for model in in_order(models)]
+        return names
 
 
 def stored_title(path):
@@ -520,12 +565,12 @@ def stored_title(path):
         return ""
 
 
-def read_attributes(path):
-    """Root attributes of a run: provenance, scene text, status."""
+def read_attributes(path: str | Path) -> dict[str, Any]:
+    """Root attributes of a run: provenance, scene text, status ('interrupted' also where its process was killed)."""
     return dict(_read(run_file(path), None).attrs)
 
 
-def read_pressures(path):
+def read_pressures(path: str | Path) -> xr.Dataset:
     """Pressures on the lining through time: `/lining`, in memory.
 
     Returns
@@ -542,17 +587,19 @@ def read_pressures(path):
     return read_group(path, "lining")
 
 
-def read_history(path):
+def read_history(path: str | Path) -> xr.Dataset:
     """Inflow, zones, balances and time step through time: `/history`, in memory."""
     return read_group(path, "history")
 
 
-def read_points(path, snapshot=None):
+def read_points(path: str | Path, snapshot: int | None = None) -> xr.Dataset:
     """Snapshots of all points: `/points`, in memory; one of them when its number is given (-1: the last)."""
     return read_group(path, "points", snapshot)
 
 
-def raw_groups(path, groups=("mesh", "history", "lining", "points")):
+def raw_groups(
+    path: str | Path, groups: Sequence[str] = ("mesh", "history", "lining", "points")
+) -> dict[str, dict[str, NDArray[Any]]]:
     """Arrays of a run file as they lie in it, complete records only: group to name to array.
 
     Raises
@@ -571,30 +618,38 @@ def raw_groups(path, groups=("mesh", "history", "lining", "points")):
                 # a scale without values stands for a dimension only
                 own = {name: data for name, data in own.items() if b"not a netCDF" not in data.attrs.get("NAME", b"")}
                 arrays[group] = {
-                    name: data[()] if data.maxshape[0] is not None else data[()][complete] for name, data in own.items()
+                    name: data[()][complete] if data.maxshape[:1] == (None,) else data[()] for name, data in own.items()
                 }
     except Exception as error:
         raise RunFileError(_why_unreadable(file, None, error)) from error
     return arrays
 
 
-def read_mesh(path):
+def read_mesh(path: str | Path) -> xr.Dataset:
     """The mesh: `/mesh`, in memory."""
     return read_group(path, "mesh")
 
 
-def read_response(path, model="beam-spring", tunnel=None):
+def read_response(path: str | Path, model: str = "beam-spring", tunnel: int | None = None) -> xr.Dataset:
     """The response of the lining of the tunnel with the gate, or of another `tunnel` by its number, in memory.
 
     It is at the angles of the pressures; what an earlier version stored between them is interpolated.
     """
     from structure.lining import at_whole_degrees
 
-    return at_whole_degrees(read_group(path, structure_group(model, tunnel)))
+    group, file = structure_group(model, tunnel), run_file(path)
+    with contextlib.suppress(Exception):  # what cannot be read is told below
+        before = f"{group.partition('/')[0]}/{model}"
+        group = before if before in _group_names(file) else group
+    return at_whole_degrees(read_group(file, group))
 
 
-def read_group(path, group, row=None):
-    """One group of a run file, in memory, with complete records only; `row` picks one of them."""
+def read_group(path: str | Path, group: str | None, row: int | None = None) -> xr.Dataset:
+    """One group of a run file, in memory, with complete records only; `row` picks one of them.
+
+    `inflow_mass` is a coordinate along `time`. Bounds of cells stay in the file: their dimension would repeat every
+    row of `to_dataframe`; ``ds.cf.add_bounds("theta")`` of cf_xarray gives them again.
+    """
     return _read(run_file(path), group, row)
 
 
@@ -613,11 +668,32 @@ def _read(file, group, row=None):
             dataset = read_group_at_once(shown, group, complete)
         if "scene_sha256" in dataset.attrs:
             _check_scene(file, dataset.attrs)
-        return dataset
+        return _with_true_status(file, _as_used(dataset))
     except RunFileError:
         raise
     except Exception as error:
         raise RunFileError(_why_unreadable(file, group, error)) from error
+
+
+def _as_used(dataset):
+    """Coordinates as such, also of files of earlier versions, and no bounds of cells."""
+    bounds = [variable.attrs.pop("bounds") for variable in dataset.coords.values() if "bounds" in variable.attrs]
+    dataset = dataset.drop_vars([name for name in bounds if name in dataset])
+    # not in the file, where CF asks a time axis for a date and space for latitudes; these are elapsed time and metres
+    for name, axis in AXES.items():
+        if name in dataset.coords:
+            dataset[name].attrs["axis"] = axis
+    if INFLOW in dataset and "time" in dataset.coords and dataset[INFLOW].dims == dataset["time"].dims:
+        dataset = dataset.set_coords(INFLOW)
+    return dataset
+
+
+def _with_true_status(file, dataset):
+    """The root's status, which a process that was killed could not correct any more."""
+    if dataset.attrs.get("status") != "running" or in_use(file.parent):
+        return dataset
+    go_on = f"; continue with: {how_to_go_on(file.parent)}" if file.name == RUN_FILE else ""
+    return dataset.assign_attrs(status="interrupted", status_message=f"its process is gone{go_on}")
 
 
 def _check_scene(file, attributes):

@@ -37,12 +37,11 @@ def exit_code(error):
     """2 for refused input, 3 for a failed run, None for what is a mistake of the program."""
     from coupling.datasets import RunFileError
     from coupling.run_folder import RunRefused
-    from coupling.scene import SceneError
     from mpm.mesh import MeshError
     from mpm.solver import RunFailed
-    from structure import LiningFailure
+    from structure import InputError, LiningFailure
 
-    if isinstance(error, (RunFileError, RunRefused, SceneError, MeshError, MemoryError, JsonRefused)):
+    if isinstance(error, (RunFileError, RunRefused, InputError, MeshError, MemoryError, JsonRefused)):
         return REFUSED
     if isinstance(error, (RunFailed, LiningFailure)):
         return FAILED

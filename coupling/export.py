@@ -1,26 +1,40 @@
 """Points and mesh of a run over time as files for ParaView and PyVista, and as an animation."""
 
+from __future__ import annotations
+
+import contextlib
 import fnmatch
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from coupling.datasets import RunFileError, read_mesh, read_points, run_file
+from coupling.datasets import RunFileError, read_mesh, read_points, read_run, run_file
+from coupling.report.series import match_times
 from coupling.run_folder import FIELDS, RunRefused
+
+if TYPE_CHECKING:
+    import meshio
+    import xarray as xr
+    from numpy.typing import NDArray
 
 #: Format: names of the files it writes, replaced by the next export into the same folder.
 FILES = {
-    "vtu": ("points_*.vtu", "mesh_*.vtu", "points.pvd", "mesh.pvd"),
-    "xdmf": ("points.xdmf", "points.h5", "mesh.xdmf", "mesh.h5"),
+    "vtu": tuple(f"{stem}{end}" for stem in ("points", "mesh", "lining", "ring_*") for end in ("_*.vtu", ".pvd")),
+    "xdmf": tuple(f"{stem}{end}" for stem in ("points", "mesh", "lining", "ring_*") for end in (".xdmf", ".h5")),
     "gif": ("gushing.gif",),
 }
+TENSOR = "stress"
 VECTORS = ("velocity_solid", "velocity_liquid", "displacement")
 #: What elements show: means over the points in them, weighted with their volume.
-ELEMENT_MEANS = ("pore_pressure", "porosity", "deviatoric_strain", "stress_xx", "stress_yy", "stress_xy")
+ELEMENT_MEANS = (
+    "pore_pressure", "porosity", "deviatoric_strain", "stress_xx", "stress_yy", "stress_zz", "stress_xy",
+)  # fmt: skip
 SECONDS_OF_ANIMATION, LONGEST_FRAME, LAST_FRAME = 6.0, 0.5, 1.5
 
 
-def export(run, kind, out=None):
+def export(run: str | Path, kind: str, out: str | Path | None = None) -> list[Path]:
     """Write the fields of a run.
 
     Parameters
@@ -28,7 +42,8 @@ def export(run, kind, out=None):
     run : str or path
         Run folder or file with snapshots of the points.
     kind : {"vtu", "xdmf", "gif"}
-        "vtu": a file a time and `.pvd` series; "xdmf": two series with their HDF5 files; "gif": an animation.
+        "vtu": a file a time and `.pvd` series; "xdmf": series with their HDF5 files; "gif": an animation. A series each
+        of the points, of the mesh, of the pressures on the lining, and of the forces of every lining model.
     out : str or path, optional
         Folder; `fields` in the run's folder when left out. Files of an earlier export are replaced, nothing else.
 
@@ -59,15 +74,15 @@ def export(run, kind, out=None):
     write = _write_vtu if kind == "vtu" else _write_xdmf
     times, shots = points["time"].values, [points.isel(time=k) for k in range(points.sizes["time"])]
     written = [write(folder / "points", times, (point_grid(shot) for shot in shots))]
-    try:
-        mesh = read_mesh(file)
-    except RunFileError:
-        return written  # a run without a stored mesh
-    return [*written, write(folder / "mesh", times, mesh_grids(shots, mesh))]
+    with contextlib.suppress(RunFileError):  # a run without a stored mesh
+        written.append(write(folder / "mesh", times, mesh_grids(shots, read_mesh(file))))
+    for stem, at, grids in ring_series(read_run(file), times):
+        written.append(write(folder / stem, at, grids))
+    return written
 
 
-def point_grid(snapshot):
-    """Points of one time as vertices: a `meshio.Mesh` with every variable, velocities and displacement as vectors.
+def point_grid(snapshot: xr.Dataset) -> meshio.Mesh:
+    """Points of one time as vertices: a `meshio.Mesh` with every variable, vectors and the stress tensor as such.
 
     snapshot : xarray.Dataset, one time of `/points`.
     """
@@ -79,10 +94,12 @@ def point_grid(snapshot):
     for name in VECTORS:
         if f"{name}_x" in data:
             data[name] = _vector(data.pop(f"{name}_x"), data.pop(f"{name}_y"))
+    if f"{TENSOR}_zz" in data:
+        data[TENSOR] = _tensor(*(data.pop(f"{TENSOR}_{part}") for part in ("xx", "yy", "zz", "xy")))
     return meshio.Mesh(position, [("vertex", np.arange(len(position))[:, None])], point_data=data)
 
 
-def mesh_grids(snapshots, mesh):
+def mesh_grids(snapshots: Iterable[xr.Dataset], mesh: xr.Dataset) -> Iterator[meshio.Mesh]:
     """The mesh with what its elements hold, one `meshio.Mesh` a time.
 
     Cell data: region, displacement, the means of `ELEMENT_MEANS` (NaN where there is no material), and filled: area of
@@ -115,8 +132,83 @@ def mesh_grids(snapshots, mesh):
         data = {name: mean(name) for name in ELEMENT_MEANS if name in snapshot}
         if "displacement_x" in snapshot:
             data["displacement"] = _vector(mean("displacement_x"), mean("displacement_y"))
+        if f"{TENSOR}_zz" in data:
+            data[TENSOR] = _tensor(*(data.pop(f"{TENSOR}_{part}") for part in ("xx", "yy", "zz", "xy")))
         data |= {"filled": (volume / area).astype("f4"), "region": region}
         yield meshio.Mesh(nodes, cells, cell_data={name: [values] for name, values in data.items()})
+
+
+def ring_series(run: xr.DataTree, times: NDArray[np.float64]) -> Iterator[tuple[str, NDArray[np.float64], Any]]:
+    """Pressures on the linings, and what every lining model made of them, as series of quadrilaterals.
+
+    Parameters
+    ----------
+    run : xarray.DataTree
+    times : (n,) float64
+        [s]; those at which there is a record are written.
+
+    Yields
+    ------
+    stem : str
+        "lining", or "ring_" and the model.
+    times : (m,) float64
+    grids : iterator of meshio.Mesh
+        A cell for each angle; cell data in SI units, `displacement` a vector, `tunnel` the number of the tunnel.
+    """
+    lining = run["lining"].to_dataset() if "lining" in run.children else None
+    if lining is None or "soil_pressure" not in lining:
+        return
+    gate = int(lining.attrs.get("gate_tunnel", 0))
+    tunnels = range(len(np.atleast_1d(lining.attrs["tunnel_x"])))
+    parts = {"lining": [(k, lining.isel(tunnel=k) if "tunnel" in lining.dims else lining) for k in tunnels]}
+    for name, group in run.children.items():
+        if name.startswith("structure"):
+            number = int(name.rpartition("_")[2]) if name != "structure" else gate
+            for model, response in group.children.items():
+                parts.setdefault(f"ring_{model}", []).append((number, response.to_dataset()))
+    for stem, of_tunnels in parts.items():
+        rows, present = match_times(of_tunnels[0][1]["time"].values, times)
+        if present.any():
+            shape = _ring_shape(lining.attrs, of_tunnels)
+            grids = (_ring_grid(shape, [(k, data.isel(time=row)) for k, data in of_tunnels]) for row in rows[present])
+            yield stem, times[present], grids
+
+
+def _ring_shape(geometry, rings):
+    """Nodes (n, 3) [m] and quadrilaterals (m, 4) of some rings: a cell for each angle, as thick as the lining."""
+    nodes, cells, first = [], [], 0
+    for k, ring in rings:
+        x, depth, outer, inner = (
+            float(np.atleast_1d(geometry[f"tunnel_{name}"])[k])
+            for name in ("x", "axis_depth", "outer_radius", "inner_radius")
+        )
+        angle = np.radians(ring["theta"].values)
+        edge = angle - 0.5 * ((angle - np.roll(angle, 1)) % (2 * np.pi))
+        for radius in (outer, inner):
+            nodes.append(_vector(x + radius * np.sin(edge), -depth + radius * np.cos(edge)))
+        n, number = len(angle), np.arange(len(angle))
+        after = (number + 1) % n
+        cells.append(first + np.column_stack([number, after, n + after, n + number]))
+        first += 2 * n
+    return np.concatenate(nodes), np.concatenate(cells)
+
+
+def _ring_grid(shape, rings):
+    """Rings at one time, with everything that they have for each angle."""
+    import meshio
+
+    data = {}
+    for k, ring in rings:
+        values = {name: ring[name].values for name in ring.data_vars if ring[name].dims == ("theta",)}
+        angle = np.radians(ring["theta"].values)
+        if "displacement_radial" in values:
+            radial, tangential = values.pop("displacement_radial"), values.pop("displacement_tangential")
+            sine, cosine = np.sin(angle), np.cos(angle)
+            values["displacement"] = _vector(radial * sine + tangential * cosine, radial * cosine - tangential * sine)
+        for name, of_cells in {**values, "tunnel": np.full(len(angle), k)}.items():
+            data.setdefault(name, []).append(of_cells)
+    cell_data = {name: [np.concatenate(parts)] for name, parts in data.items()}
+    return meshio.Mesh(shape[0], [("quad", shape[1])], cell_data=cell_data)
 
 
 def _write_vtu(stem, times, grids):
@@ -180,6 +272,12 @@ def _palette():
 
 def _vector(x, y):
     return np.column_stack([x, y, np.zeros_like(x)])
+
+
+def _tensor(xx, yy, zz, xy):
+    """A symmetric tensor of plane strain, row by row, (n, 9)."""
+    zero = np.zeros_like(xx)
+    return np.column_stack([xx, xy, zero, xy, yy, zero, zero, zero, zz])
 
 
 def _prepared(folder, kind):

@@ -3,18 +3,24 @@
 Every function returns a `matplotlib.figure.Figure` that belongs to the caller; nothing touches pyplot's global state.
 """
 
+from __future__ import annotations
+
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
 from matplotlib.collections import EllipseCollection, PolyCollection
 from matplotlib.colors import LogNorm, Normalize
-from matplotlib.figure import Figure
 from matplotlib.patches import Annulus, Polygon
 from matplotlib.ticker import MaxNLocator
 
 from coupling.datasets import RunFileError, read_history, read_mesh, read_points, read_pressures, read_response
+from coupling.picture import Picture
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 STYLE = {
     "font.size": 8,
@@ -36,7 +42,12 @@ CONCRETE = "0.82"
 FIELD_COLOURS = ("viridis", "magma_r", "YlGnBu", "cividis")  # of displacement, strain, pore pressure, stress
 
 
-def fields_around_tunnel(points, half_width=None, tops=None, tunnel=None):
+def fields_around_tunnel(
+    points: xr.Dataset,
+    half_width: float | None = None,
+    tops: dict[str, float] | None = None,
+    tunnel: int | None = None,
+) -> Picture:
     """Displacement, deviatoric strain, pore pressure, vertical effective stress (compression positive) on the points.
 
     Parameters
@@ -55,7 +66,7 @@ def fields_around_tunnel(points, half_width=None, tops=None, tunnel=None):
     half = 3.0 * radius if half_width is None else half_width
     data, fields = _fields(points, x0, y0, half)
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 6.4), layout="constrained")
+        figure = Picture(figsize=(7.2, 6.4), layout="constrained")
         axes = figure.subplots(2, 2, sharex=True, sharey=True)
         for axis, (title, values, colours, norm, extend) in zip(axes.flat, fields, strict=True):
             if norm is None:
@@ -74,7 +85,7 @@ def fields_around_tunnel(points, half_width=None, tops=None, tunnel=None):
     return figure
 
 
-def common_tops(points):
+def common_tops(points: xr.Dataset) -> dict[str, float]:
     """Top of the linear colour scales that suits all times: title of a panel to its value, for `fields_around_tunnel`.
 
     points : xarray.Dataset, `/points` of a run.
@@ -107,7 +118,7 @@ def _top(values, extend):
     return max(float(np.nanmax(values) if extend == "neither" else np.nanpercentile(values, 99.5)), 1.0)
 
 
-def mesh_near_gate(mesh, half_width=None):
+def mesh_near_gate(mesh: xr.Dataset, half_width: float | None = None) -> Picture:
     """The mesh around the gate, parts in different colours, with the whole tunnel beside it."""
     geometry = _Geometry(mesh)
     corners = np.stack([mesh["x"].values, mesh["y"].values], axis=1)[mesh["element_nodes"].values]
@@ -119,7 +130,7 @@ def mesh_near_gate(mesh, half_width=None):
         gx, gy = geometry.at(geometry.gate["angle"], radius - 0.5 * geometry.thickness)
         views.append((gx, gy, 5 * geometry.gate["width"] if half_width is None else half_width))
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(3.6 * len(views), 3.5), layout="constrained")
+        figure = Picture(figsize=(3.6 * len(views), 3.5), layout="constrained")
         axes = np.atleast_1d(figure.subplots(1, len(views)))
         for axis, (x, y, half), line in zip(axes, views, (0.2, 0.4), strict=False):
             near = (np.abs(corners - [x, y]) < 2 * half).all(axis=(1, 2))
@@ -136,7 +147,7 @@ def mesh_near_gate(mesh, half_width=None):
     return figure
 
 
-def pressures_polar(pressures, time=-1, tunnel=None):
+def pressures_polar(pressures: xr.Dataset, time: int = -1, tunnel: int | None = None) -> Picture:
     """Soil and water pressure on the lining, initial against now.
 
     Parameters
@@ -154,7 +165,7 @@ def pressures_polar(pressures, time=-1, tunnel=None):
     angle = np.radians(pressures["theta"].values)
     first, now = pressures.isel(time=0), pressures.isel(time=time)
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 4.0), layout="constrained")
+        figure = Picture(figsize=(7.2, 4.0), layout="constrained")
         axes = figure.subplots(1, 2, subplot_kw={"projection": "polar"})
         titles = {"soil_pressure": "effective soil pressure [kPa]", "water_pressure": "water pressure [kPa]"}
         for axis, (name, title) in zip(axes, titles.items(), strict=True):
@@ -170,7 +181,7 @@ def pressures_polar(pressures, time=-1, tunnel=None):
     return figure
 
 
-def internal_forces(response, time=-1):
+def internal_forces(response: xr.Dataset, time: int = -1) -> Picture:
     """Axial force, shear force and bending moment around the ring, initial against now, with their extremes.
 
     Parameters
@@ -188,7 +199,7 @@ def internal_forces(response, time=-1):
         ("bending_moment", "bending moment M [kN m/m]"),
     )
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.4, 3.15), layout="constrained")
+        figure = Picture(figsize=(7.4, 3.15), layout="constrained")
         axes = figure.subplots(1, 3, subplot_kw={"projection": "polar"})
         for axis, (name, title) in zip(axes, panels, strict=True):
             _crown_up(axis)
@@ -216,7 +227,7 @@ def internal_forces(response, time=-1):
     return figure
 
 
-def deformed_ring(response, time=-1):
+def deformed_ring(response: xr.Dataset, time: int = -1) -> Picture:
     """The deformed ring, initial against now, exaggerated, with its joints and their rotations.
 
     Parameters
@@ -237,7 +248,7 @@ def deformed_ring(response, time=-1):
     factor = _round_down(0.18 * radius / max(largest, 1e-12))
     joints = np.radians(response["joint_angle"].values) if response.sizes.get("joint") else np.array([])
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(4.6, 4.7), layout="constrained")
+        figure = Picture(figsize=(4.6, 4.7), layout="constrained")
         axis = figure.subplots()
         axis.add_patch(Annulus((0, 0), outer, outer - inner, fc="0.92", ec="0.8", lw=0.5, zorder=0))
         styles = ({"color": INITIAL, "ls": (0, (4, 2)), "lw": 1.1, "label": "initial"}, {"color": NOW})
@@ -271,17 +282,17 @@ def deformed_ring(response, time=-1):
         axis.set_ylabel("y from the axis [m]")
         axis.set_title(
             f"deformation, {factor:g} times enlarged (largest {1e3 * np.hypot(radial, tangential).max():.1f} mm)\n"
-            "at the joints: rotation and opening"
+            "at the joints: rotation, and opening (+) or closing (\N{MINUS SIGN})"
         )
         _legend_below(figure, axis)
     return figure
 
 
-def inflow(history):
+def inflow(history: xr.Dataset) -> Picture:
     """Inflow mass, and areas of flow zone and disturbed zone, over time."""
     time = history["time"].values
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(4.6, 4.4), layout="constrained")
+        figure = Picture(figsize=(4.6, 4.4), layout="constrained")
         upper, lower = figure.subplots(2, 1, sharex=True)
         upper.plot(time, history["inflow_mass"].values, color=NOW)
         upper.set_ylabel("inflow mass [kg/m]")
@@ -299,7 +310,7 @@ def inflow(history):
     return figure
 
 
-def draw_run(run, folder):
+def draw_run(run: str | Path, folder: str | Path) -> list[Path]:
     """Draw every picture a run has data for, as PNG.
 
     Parameters
@@ -400,13 +411,13 @@ class _Geometry:
         return x + radius * np.sin(np.radians(theta)), y + radius * np.cos(np.radians(theta))
 
     def draw(self, axis, zorder=1):
-        """Lining in grey, with the gap."""
+        """Lining in grey, with the gate."""
         for k, (x, depth, outer, inner) in enumerate(self.tunnels):
             style = {"fc": CONCRETE, "ec": "0.25", "lw": 0.6, "zorder": zorder}
             if self.gate is None or k != self.tunnel:
                 axis.add_patch(Annulus((x, -depth), outer, outer - inner, **style))
                 continue
-            # the walls of the gap are parallel: its angle differs on the two faces
+            # the walls of the gate are parallel: its angle differs on the two faces
             faces = []
             for radius in (outer, inner):
                 half = np.arcsin(self.gate["width"] / 2 / radius)

@@ -1,18 +1,21 @@
 """What a file or folder is, for somebody who finds it: kind, content, and what to do with it."""
 
+from __future__ import annotations
+
 import json
 import tomllib
 from pathlib import Path
+from typing import Any
 
 from coupling.datasets import RunFileError
 from coupling.own_content import require_own_content
-from coupling.run_folder import RUN_FILE, RunRefused
+from coupling.run_folder import RUN_FILE, RunRefused, how_to_go_on
 from coupling.studies.execute import STUDY_FILE
 
 SIGNATURES = {b"\x89HDF\r\n\x1a\n": "netcdf", b"\x89PNG\r\n\x1a\n": "png", b"GIF8": "gif", b"CDF": "netcdf3"}
 
 
-def describe(path):
+def describe(path: str | Path) -> dict[str, Any]:
     """What a path is.
 
     Parameters
@@ -44,7 +47,7 @@ def _folder(path):
         facts = _run_facts(path / RUN_FILE)
         others = sorted(entry.name for entry in path.iterdir() if entry.name not in (RUN_FILE, ".lock"))
         return {"kind": "run folder", "facts": facts | {"beside run.nc": ", ".join(others) or "nothing"},
-                "next": _run_commands(path)}  # fmt: skip
+                "next": _run_commands(path, facts)}  # fmt: skip
     if (path / STUDY_FILE).is_file():
         return _study(path)
     runs = sorted(entry.parent.name for entry in path.glob(f"*/{RUN_FILE}"))
@@ -102,7 +105,8 @@ def _netcdf(path):
             f"'{path}': cannot be read as netCDF-4 ({type(error).__name__}: {error}); copy it again or repeat the run"
         ) from error
     if {"lining", "history"} <= set(groups):
-        return {"kind": "run file", "facts": _run_facts(path), "next": _run_commands(path)}
+        facts = _run_facts(path)
+        return {"kind": "run file", "facts": facts, "next": _run_commands(path, facts)}
     kind = "pressures on a lining" if {"soil_pressure", "water_pressure"} <= set(names) else (
         "response of a lining" if "bending_moment" in names else "netCDF-4 file"
     )  # fmt: skip
@@ -131,15 +135,19 @@ def _run_facts(file):
             facts["snapshots of the points"] = int(content["points"].dimensions["time"].size)
         if "mesh" in content.groups:
             facts["triangles"] = int(content["mesh"].dimensions["element"].size)
-        models = list(content["structure"].groups) if "structure" in content.groups else []
+        stored = content["structure"].groups if "structure" in content.groups else {}
+        models = [str(group.attrs.get("model", name)) for name, group in stored.items()]
     facts["lining models"] = ", ".join(models) or "none"
     errors = stored_quality(attributes)
     facts |= {"errors": quality_line(errors)} if errors else {}
     return facts | {f"warning {k}": text for k, text in enumerate(poor_errors(errors), start=1)}
 
 
-def _run_commands(path):
-    return [f"gush report {path}", f"gush export {path}", f"gush respond {path}"]
+def _run_commands(path, facts):
+    folder = path.parent if path.name == RUN_FILE else path
+    stopped = facts["status"].startswith("interrupted") and (folder / RUN_FILE).is_file()
+    resume = [how_to_go_on(folder)] if stopped else []
+    return [*resume, f"gush report {path}", f"gush export {path}", f"gush respond {path}"]
 
 
 def _scene(path):

@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from coupling.exit_codes import FAILED, JsonPath, checked_json, complain, failures, write_json
+from coupling.progress_line import ProgressLine
 
 
 def accuracy_command(
@@ -108,7 +109,8 @@ def stability_command(
     with failures(), checked_json(json_path):
         from coupling.stability.command import stability, tables
 
-        data = stability(case or [], linear, out, Console(stderr=True).print)
+        with ProgressLine() as line:
+            data = stability(case or [], linear, out, Console(stderr=True).print, line.say)
         write_json(json_path, data)
         if str(json_path) != "-":
             console = Console()

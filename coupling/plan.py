@@ -1,9 +1,22 @@
 """What a run would do and cost, before it starts: the table and the JSON of `gush plan`."""
 
+from __future__ import annotations
+
 import math
 import time as clock
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from coupling.plausibility import warn_in_python, warnings_of
 from coupling.run import check_memory, free_memory_bytes
+from coupling.scene import as_scene
+
+if TYPE_CHECKING:
+    from coupling.scene import Scene
+    from mpm.scene import Scene as MpmScene
 
 WARM_UP_STEPS, MEASURED_SPELLS, SECONDS_A_SPELL = 10, 5, 0.3
 # Inflow of grains over that of free discharge under the head at the gate, from runs of case 3 (docs/case-3.md): a rough
@@ -11,35 +24,46 @@ WARM_UP_STEPS, MEASURED_SPELLS, SECONDS_A_SPELL = 10, 5, 0.3
 DISCHARGE_SHARE = 0.11
 
 
-def plan(scene, threads=None):
+def plan(
+    scene: Scene | str | Path, threads: int | None = None, warn: Callable[[str], None] | None = None
+) -> dict[str, Any]:
     """Build the mesh and the points of a scene, take a few steps, and say what the run will cost.
 
     Parameters
     ----------
-    scene : coupling.Scene
+    scene : coupling.Scene, str or path
+        As of :func:`coupling.run`.
     threads : int or None
+    warn : callable or None
+        As of :func:`coupling.run`.
 
     Returns
     -------
     dict
         scene; features: list of {feature, active, reason}; elements, nodes, points; min_altitude [m]; min_angle
         [degree]; dt [s]; dt_limit; stop_time [s] or None; stop_inflow_mass [kg/m] or None; steps_at_most (None without
-        a stop time); expected_time [s] and expected_steps: rough where the run stops at an inflow mass; records;
-        memory_bytes, free_memory_bytes; point_steps_per_second: measured now; expected_seconds: of stepping, without
-        mesh, relaxation and pictures.
+        a stop time); expected_time [s] and expected_steps: rough where the run stops at an inflow mass; steps are those
+        of the smallest elements, cut to the output interval; expected_point_steps: updates of one point by one step;
+        records; memory_bytes, free_memory_bytes; point_steps_per_second: measured now; expected_seconds: of stepping,
+        without mesh, relaxation and pictures. Steps are counted with the step of the initial state.
     """
     import mpm
 
+    scene = as_scene(scene)
+    for warning in warnings_of(scene):
+        (warn if warn is not None else warn_in_python)(warning)
     check_memory(scene.mpm)
     mesh = mpm.build_mesh(scene.mpm)
     solver = mpm.Solver(scene.mpm, mesh, threads)
     dt, limit = solver.time_step_estimate()
     rate = _measured_rate(solver)
     stop = scene.mpm.stop
-    time = expected_time(scene.mpm)
+    time, interval = expected_time(scene.mpm), scene.mpm.output.interval
+    most = None if stop.time is None else _work(solver, dt, interval, stop.time)[0]
+    steps, point_steps = _work(solver, dt, interval, time)
     return {
         "scene": scene.name,
-        "features": features(scene, solver.threads),
+        "features": features(scene, solver.threads, _why_alone(len(solver.mesh.elements), threads)),
         "elements": len(solver.mesh.elements),
         "nodes": len(solver.mesh.nodes),
         "points": int(solver.n_points),
@@ -49,23 +73,64 @@ def plan(scene, threads=None):
         "dt_limit": limit,
         "stop_time": stop.time,
         "stop_inflow_mass": stop.inflow_mass,
-        "steps_at_most": None if stop.time is None else math.ceil(stop.time / dt),
+        "steps_at_most": most,
         "expected_time": time,
-        "expected_steps": math.ceil(time / dt),
-        "records": 1 + math.ceil(time / scene.mpm.output.interval),
+        "expected_steps": steps,
+        "expected_point_steps": point_steps,
+        "records": 1 + _intervals(interval, time)[0],
         "memory_bytes": int(solver.memory_bytes()),
         "free_memory_bytes": free_memory_bytes(),
         "point_steps_per_second": rate,
-        "expected_seconds": math.ceil(time / dt) * solver.n_points / rate,
+        "expected_seconds": point_steps / rate,
     }
 
 
-def rough_plan(scene):
+def _intervals(interval, time):
+    """Number of output intervals until a time, and the length of the last [s]."""
+    count = max(math.ceil(time / interval * (1 - 1e-12)), 1)
+    return count, time - (count - 1) * interval
+
+
+def _work(solver, dt, interval, time):
+    """Steps of the smallest elements, and updates of one point by one step, until a time."""
+    count, last = _intervals(interval, time)
+    full, rest = (np.array(_work_within(solver, length / dt)) for length in (interval, last))
+    steps, point_steps = (count - 1) * full + rest
+    return int(steps), int(point_steps)
+
+
+def _work_within(solver, steps):
+    """The same within one interval, `steps` times the critical step of the smallest elements long."""
+    from mpm.clock import choose_periods
+
+    points = np.diff(solver.start[solver.levels.element_cuts]).astype(np.int64)
+    periods = np.ones(len(points), np.int64)
+    several = choose_periods(points, float(steps), periods)
+    made = several * periods[-1]
+    return made, int(np.sum(points * (made // periods)))
+
+
+def _why_alone(elements, asked):
+    """Why a mesh of so many elements is computed by one thread; empty where it is not."""
+    from mpm.solver import SMALLEST_PARALLEL, cores
+
+    if elements < SMALLEST_PARALLEL:
+        return f"{elements:.0f} elements, a second thread pays from {SMALLEST_PARALLEL}"
+    return "one was asked for" if asked == 1 else "one core" if asked is None and cores() == 1 else ""
+
+
+def rough_plan(
+    scene: Scene | str | Path, threads: int | None = None, warn: Callable[[str], None] | None = None
+) -> dict[str, Any]:
     """What a run would do and cost, from formulas alone: no mesh, no points, some milliseconds.
 
     Parameters
     ----------
-    scene : coupling.Scene
+    scene : coupling.Scene, str or path
+        As of :func:`coupling.run`.
+    threads : int or None
+    warn : callable or None
+        As of :func:`coupling.run`.
 
     Returns
     -------
@@ -79,7 +144,14 @@ def rough_plan(scene):
     coupling.run_folder.RunRefused
         Too little memory.
     """
+    from mpm.solver import threads_used
+    from mpm.threads import check_threads
+
+    scene = as_scene(scene)
+    for warning in warnings_of(scene):
+        (warn if warn is not None else warn_in_python)(warning)
     check_memory(scene.mpm)
+    check_threads(threads)
     s = scene.mpm
     elements, time = s.estimated_elements, expected_time(s)
     sizes = [s.discretisation.element_size] + [s.discretisation.element_size_lining] * bool(s.tunnels)
@@ -89,19 +161,25 @@ def rough_plan(scene):
     dt = s.numerics.courant * 0.6 * min(sizes) / max(_wave_speed(soil, s.water) for soil in s.soils)
     return {
         "scene": scene.name,
-        "features": features(scene, 1),
+        "features": features(scene, threads_used(elements, threads), _why_alone(elements, threads)),
         "elements": math.ceil(elements),
         "points": math.ceil(elements * s.discretisation.points_per_element),
         "dt": dt,
         "stop_time": s.stop.time,
         "stop_inflow_mass": s.stop.inflow_mass,
-        "steps_at_most": None if s.stop.time is None else math.ceil(s.stop.time / dt),
+        "steps_at_most": None if s.stop.time is None else _rough_steps(dt, s.output.interval, s.stop.time),
         "expected_time": time,
-        "expected_steps": None if time is None else math.ceil(time / dt),
-        "records": None if time is None else 1 + math.ceil(time / s.output.interval),
+        "expected_steps": None if time is None else _rough_steps(dt, s.output.interval, time),
+        "records": None if time is None else 1 + _intervals(s.output.interval, time)[0],
         "memory_bytes": math.ceil(s.estimated_bytes),
         "free_memory_bytes": free_memory_bytes(),
     }
+
+
+def _rough_steps(dt, interval, time):
+    """Steps until a time where each output interval takes a whole number of them."""
+    count, last = _intervals(interval, time)
+    return (count - 1) * math.ceil(interval / dt) + math.ceil(last / dt)
 
 
 def _wave_speed(soil, water):
@@ -114,7 +192,7 @@ def _wave_speed(soil, water):
     return fast_wave_speed(modulus, water.bulk_modulus, soil.porosity, soil.grain_density, water.density)
 
 
-def expected_time(mpm_scene):
+def expected_time(mpm_scene: MpmScene) -> float | None:
     """Simulated time until the run stops [s]; a rough guess where an inflow mass stops it."""
     stop = mpm_scene.stop
     if stop.inflow_mass is None or mpm_scene.gate is None:
@@ -133,8 +211,11 @@ def expected_time(mpm_scene):
     return time if stop.time is None else min(time, stop.time)
 
 
-def features(scene, threads):
-    """What is active in a scene, what is left out, and why: list of {feature, active, reason}."""
+def features(scene: Scene, threads: int, why_alone: str = "one thread") -> list[dict[str, Any]]:
+    """What is active in a scene, what is left out, and why: list of {feature, active, reason}.
+
+    scene : coupling.Scene;  threads : int;  why_alone : str, the reason where it is one.
+    """
     s, numerics = scene.mpm, scene.mpm.numerics
     plastic = [soil.name for soil in s.soils if soil.model == "mohr-coulomb"]
     resting = [f"{t.friction_coefficient:g}" for t in s.tunnels if t.friction_coefficient > 0]
@@ -172,6 +253,11 @@ def features(scene, threads):
             numerics.pressure_filter > 0 and s.water is not None,
             f"{numerics.pressure_filter:g} of what no node feels, a step" if numerics.pressure_filter else "set to 0",
         ),
+        (
+            "stress damping",
+            numerics.stress_damping > 0,
+            f"stress runs ahead by {numerics.stress_damping:g} of a step" if numerics.stress_damping else "set to 0",
+        ),
         ("motion of the lining", any(s.lining_of(t) != "fixed" for t in s.tunnels), _linings(s)),
         ("the half x < 0", not s.is_half, _why_half(s)),
         (
@@ -179,7 +265,7 @@ def features(scene, threads):
             s.output.points,
             points if s.output.points else "pressures and history only: output.points = false",
         ),
-        ("several threads", threads > 1, f"{threads} threads" if threads > 1 else "one core, or too few elements"),
+        ("several threads", threads > 1, f"{threads} threads" if threads > 1 else why_alone),
         (
             "ring response",
             scene.ring is not None,

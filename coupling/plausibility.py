@@ -1,13 +1,27 @@
 """Numbers that are possible but of another order of magnitude than any soil, water or lining: usually a wrong unit."""
 
-import math
+from __future__ import annotations
 
-PRESSURE = {"kPa": 1e3, "MPa": 1e6, "GPa": 1e9}
-LENGTH = {"mm": 1e-3, "cm": 1e-2}
-PERCENT = {"percent": 1e-2}
-RADIANS = {"rad": 180 / math.pi}
-DENSITY = {"t/m3": 1e3}
-FORCE = {"kN": 1e3, "MN": 1e6}
+import math
+import warnings
+from typing import TYPE_CHECKING, Any
+
+from structure.inputs import GushingWarning
+from structure.plausibility import (
+    DENSITY,
+    GROUND,
+    LENGTH,
+    PERCENT,
+    PRESSURE,
+    RADIANS,
+    RING,
+    is_number,
+    joints_in_radians,
+    unusual,
+)  # fmt: skip
+
+if TYPE_CHECKING:
+    from coupling.scene import Scene
 
 #: Table and key to (lowest, highest, unit, other units that people use with their factors). Zero always passes: it
 #: leaves a property out. The ranges are those of handbooks, widened until soft clay, rock and small models fit in.
@@ -41,29 +55,16 @@ USUAL = {
         "element_size_lining": (0.005, 50, "m", LENGTH),
         "element_size_interior": (0.005, 50, "m", LENGTH),
     },
-    "ring": {
-        "outer_diameter": (0.5, 25, "m", LENGTH),
-        "inner_diameter": (0.5, 25, "m", LENGTH),
-        "concrete_modulus": (1e9, 5e11, "Pa", PRESSURE),
-        "concrete_unit_weight": (1e3, 2e5, "N/m3", {"kN/m3": 1e3}),
-        "joint_rotational_stiffness": (1e6, 1e12, "N m/rad", FORCE),
-        "joint_normal_stiffness": (1e6, 1e13, "N/m", FORCE),
-        "joint_shear_stiffness": (1e6, 1e13, "N/m", FORCE),
-        "joint_friction_coefficient": (0.02, 2, "as a ratio", PERCENT),
-    },
-    "ring.ground": {
-        "youngs_modulus": (2e5, 2e10, "Pa", PRESSURE),
-        "cohesion": (100, 5e6, "Pa", PRESSURE),
-        "friction_angle": (5, 50, "degrees", RADIANS),
-        "vertical_stress": (500, 5e7, "Pa", PRESSURE),
-        "horizontal_stress": (100, 5e7, "Pa", PRESSURE),
-        "limit_pressure_normal": (500, 1e9, "Pa", PRESSURE),
-        "limit_pressure_tangential": (500, 1e9, "Pa", PRESSURE),
-    },
+    "ring": RING,
+    "ring.ground": GROUND,
 }
 
 
-def warnings_of(scene):
+#: Least ground between a tunnel and the held edges of the box, in diameters; analyses of practice leave twice as much.
+LEAST_BESIDE, LEAST_BELOW = 1.5, 1.0
+
+
+def warnings_of(scene: Scene) -> list[str]:
     """What a user should look at again before a run: one sentence a number, empty where all is usual.
 
     Parameters
@@ -81,6 +82,33 @@ def warnings_of(scene):
             f"output.interval {output.interval:g} s is not below stop.time {stop.time:g} s: only the first and the "
             f"last state are recorded; write e.g. {stop.time / 100:g}"
         )
+    return told + _narrow_box(scene.mpm)
+
+
+def warn_in_python(message: str) -> None:
+    """Tell a user of Python what the command line prints: a :class:`structure.GushingWarning`."""
+    warnings.warn(message, GushingWarning, stacklevel=3)
+
+
+def _narrow_box(scene):
+    """Tunnels so close to the edges of the box that these hold the ground around them, as sentences."""
+    told, box = [], scene.box
+    for k, tunnel in enumerate(scene.tunnels):
+        diameter = tunnel.outer_diameter
+        beside = box.width / 2 - abs(tunnel.x) - tunnel.outer_radius
+        below = box.depth - tunnel.axis_depth - tunnel.outer_radius
+        for key, space, least, grown in (
+            ("width", beside, LEAST_BESIDE * diameter, 2 * (abs(tunnel.x) + tunnel.outer_radius)),
+            ("depth", below, LEAST_BELOW * diameter, tunnel.axis_depth + tunnel.outer_radius),
+        ):
+            if space < least:
+                where = "beside" if key == "width" else "below"
+                wide = grown + (2 if key == "width" else 1) * least
+                told.append(
+                    f"box.{key} leaves {space:.3g} m {where} tunnel {k} of {diameter:g} m: its edge, which is held, "
+                    f"takes part in what happens at the tunnel; leave {least / diameter:g} diameters, "
+                    f"write {math.ceil(wide)} m or more"
+                )
     return told
 
 
@@ -96,7 +124,7 @@ def _other_rings(scene):
     ]  # fmt: skip
 
 
-def hints(data):
+def hints(data: dict[str, Any]) -> dict[tuple[Any, ...], str]:
     """Unusual numbers of a scene's nested dictionary, validated or not.
 
     Returns
@@ -114,14 +142,14 @@ def hints(data):
             path = (*name.split("."), *(() if index is None else (index,)))
             for key, (low, high, unit, others) in usual.items():
                 value = entry.get(key) if isinstance(entry, dict) else None
-                hint = _hint(value, low, high, unit, others)
+                hint = unusual(value, low, high, unit, others)
                 if hint:
                     found[*path, key] = hint
     found |= _angles_in_radians(data)
     return found
 
 
-def shown(path):
+def shown(path: tuple[Any, ...]) -> str:
     """A path as people write it: soils[0].porosity."""
     text = ""
     for part in path:
@@ -130,35 +158,21 @@ def shown(path):
     return text
 
 
-def _hint(value, low, high, unit, others):
-    if not _is_number(value) or value == 0 or low <= value <= high:
-        return ""
-    hint = f"is unusual, got {value:g}: between {low:g} and {high:g} {unit} is usual"
-    for other, factor in others.items():
-        if low <= value * factor <= high:
-            return f"{hint}; if {value:g} {other} was meant, write {value * factor:.6g}"
-    return f"{hint}; check the number and its unit"
-
-
 def _angles_in_radians(data):
     """The gate or all joints within a few degrees of the crown, at simple fractions of pi."""
     found = {}
     gate, ring = data.get("gate"), data.get("ring")
     angle = gate.get("angle") if isinstance(gate, dict) else None
-    if _is_number(angle) and 0 < angle <= 2 * math.pi + 1e-3:
+    if is_number(angle) and 0 < angle <= 2 * math.pi + 1e-3:
         steps = angle / (math.pi / 12)
         if abs(steps - round(steps)) < 0.005 and abs(2 * angle - round(2 * angle)) > 1e-9:
             found["gate", "angle"] = (
                 f"is a simple fraction of pi, got {angle:g} degrees; if radians were meant, write "
                 f"{math.degrees(angle):.4g}"
             )
-    joints = ring.get("joint_angles") if isinstance(ring, dict) else None
-    if isinstance(joints, list | tuple) and len(joints) > 1 and all(_is_number(joint) for joint in joints):
-        if 0 <= min(joints) and max(joints) <= 2 * math.pi:
-            degrees = ", ".join(f"{math.degrees(joint):.4g}" for joint in joints)
-            found["ring", "joint_angles"] = (
-                f"all lie within 6.3 degrees of the crown; if radians were meant, write [{degrees}]"
-            )
+    joints = joints_in_radians(ring.get("joint_angles")) if isinstance(ring, dict) else ""
+    if joints:
+        found["ring", "joint_angles"] = joints
     return found
 
 
@@ -171,8 +185,3 @@ def _follows(path, data):
     for part in path:
         value = value[part]
     return any(entry.get(path[-1]) == value for entry in others)
-
-
-def _is_number(value):
-    # an integer of any length has no place in a scene, and none in a float
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300

@@ -103,6 +103,7 @@ def _has_lining(file):
 def _ring(file, root, scene, tunnel):
     from coupling.scene import ring_of
     from structure import Ring
+    from structure.inputs import mistakes, refusal
 
     if scene is not None:
         if scene.ring is None:
@@ -116,4 +117,5 @@ def _ring(file, root, scene, tunnel):
     try:
         return Ring.model_validate_json(root.attrs["ring"])
     except ValidationError as problem:
-        raise RunFileError(f"'{file}': attribute 'ring' must describe a structure.Ring, got: {problem}") from problem
+        told = refusal("it", mistakes(problem, Ring))
+        raise RunFileError(f"'{file}': attribute 'ring' must describe a structure.Ring: {told}") from None

@@ -3,7 +3,6 @@
 import errno
 import hashlib
 import logging
-import shlex
 import time as clock
 from datetime import UTC, datetime
 
@@ -14,7 +13,7 @@ from coupling.datasets import RunWriter, read_history, write_attributes
 from coupling.journal import replace_file
 from coupling.provenance import root_attributes, with_history
 from coupling.quality import quality, quality_attributes, quality_line, states_line
-from coupling.run_folder import MESH_FILE, RUN_FILE, SCENE_FILE, RunRefused
+from coupling.run_folder import MESH_FILE, RUN_FILE, SCENE_FILE, RunRefused, how_to_go_on
 from coupling.stop_signals import stop_signals
 
 MOST_TIME_FOR_CHECKPOINTS = 0.02  # share of the wall time that writing them may take
@@ -72,7 +71,7 @@ class RecordedSimulation:
             log.warning("interrupted: %s", reason)
             full = isinstance(error, OSError) and error.errno in FULL
             room = f"make room on the disk of '{self.folder}', then " if full else ""
-            error.add_note(f"what was computed is kept; {room}continue with: {self._how_to_go_on()}")
+            error.add_note(f"what was computed is kept; {room}continue with: {how_to_go_on(self.folder)}")
             self._close_if_possible(f"stopped by {reason}")
             raise
         except BaseException as error:
@@ -84,7 +83,7 @@ class RecordedSimulation:
         log.info("finished in %.1f s", clock.monotonic() - self._begin[0])
         if asked is not None:
             interrupt = KeyboardInterrupt(asked)
-            interrupt.add_note(f"the simulation is finished; ring response and pictures: {self._how_to_go_on()}")
+            interrupt.add_note(f"the simulation is finished; ring response and pictures: {how_to_go_on(self.folder)}")
             raise interrupt
 
     def _prepare(self):
@@ -149,9 +148,6 @@ class RecordedSimulation:
                     if stop.asked is not None:
                         raise KeyboardInterrupt(stop.asked)
             return stop.asked
-
-    def _how_to_go_on(self):
-        return f"gush run --resume --out {shlex.quote(str(self.folder))}"
 
     def _append(self, record):
         self.writer.append(record)

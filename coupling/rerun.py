@@ -1,8 +1,15 @@
 """A run repeated from what its file says, and compared bit for bit with it."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 
 from coupling.datasets import raw_groups, read_attributes, run_file
+from coupling.plausibility import warn_in_python
 from coupling.provenance import DECISIVE, differences, root_attributes
 from coupling.run import run
 from coupling.run_folder import RunRefused, default_folder
@@ -12,7 +19,13 @@ from coupling.scene import parse_scene
 NOT_COMPARED = {"cpu_seconds"}
 
 
-def rerun(first, out=None, progress=None, threads=None, warn=lambda message: None):
+def rerun(
+    first: str | Path,
+    out: str | Path | None = None,
+    progress: Callable[[dict[str, Any]], None] | None = None,
+    threads: int | None = None,
+    warn: Callable[[str], None] | None = None,
+) -> dict[str, Any]:
     """Repeat a run in another folder and compare all that was simulated.
 
     Parameters
@@ -20,8 +33,8 @@ def rerun(first, out=None, progress=None, threads=None, warn=lambda message: Non
     first : str or path
         Folder or run.nc of the run; finished or not.
     out, progress, threads, warn
-        As of :func:`coupling.run`; `out` is ``runs/<scene>-rerun``, numbered, when None. `warn` is told what differs
-        between then and now that the bits may depend on.
+        As of :func:`coupling.run`; `out` is ``runs/<scene>-rerun``, numbered, when None. `warn` is also told what
+        differs between then and now that the bits may depend on.
 
     Returns
     -------
@@ -40,14 +53,14 @@ def rerun(first, out=None, progress=None, threads=None, warn=lambda message: Non
     scene = parse_scene(attributes["scene"], str(file))
     changed = differences(attributes, root_attributes(scene), (*DECISIVE, "gmsh", "processor"))
     for name, (before, now) in changed.items():
-        warn(f"{name}: {before} then, {now} now; results may differ")
+        (warn if warn is not None else warn_in_python)(f"{name}: {before} then, {now} now; results may differ")
     folder = run(
         scene, default_folder(f"{scene.name}-rerun") if out is None else out, False, progress, threads, warn=warn
     ).attrs["run"]
     return {"run": str(first), "rerun": folder, "changed": changed, **compare_bits(file, folder)}
 
 
-def compare_bits(first, second):
+def compare_bits(first: str | Path, second: str | Path) -> dict[str, Any]:
     """Compare mesh, pressures, history and points of two runs over the records that both have.
 
     Returns

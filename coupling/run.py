@@ -1,17 +1,33 @@
 """A run from scene to files: mesh, simulation written as it goes, response of the ring, pictures."""
 
+from __future__ import annotations
+
 import contextlib
 import logging
+import numbers
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from coupling.checkpoint import remove_checkpoints
 from coupling.datasets import read_attributes, read_pressures, write_response
-from coupling.plausibility import warnings_of
+from coupling.plausibility import warn_in_python, warnings_of
+from coupling.progress_line import ProgressLine, in_notebook
 from coupling.quality import poor_errors, stored_quality
 from coupling.recorded_simulation import RecordedSimulation, write_quality
 from coupling.resume import find_remains
 from coupling.run_folder import FIGURES, LOG_FILE, RUN_FILE, RunRefused, claimed, default_folder, reopened
-from coupling.scene import SceneError, ring_of
+from coupling.scene import SceneError, as_scene, ring_of
+from mpm.threads import check_threads
 from structure.models import model_name
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from coupling.scene import Scene
+    from mpm.scene import Scene as MpmScene
+    from structure.ring import Ring
 
 BYTES_PER_ELEMENT = 2000  # points, buffers and the copy made while sorting, of a case with 3 points an element
 
@@ -19,33 +35,47 @@ log = logging.getLogger(__name__)
 
 
 def run(
-    scene=None, out=None, overwrite=False, progress=None, threads=None, figures=False, resume=False,
-    checkpoint_interval=60.0, warn=None,
-):  # fmt: skip
+    scene: Scene | str | Path | None = None,
+    out: str | Path | None = None,
+    overwrite: bool = False,
+    progress: Callable[[dict[str, Any]], None] | bool | None = None,
+    threads: int | None = None,
+    figures: bool = False,
+    resume: bool = False,
+    checkpoint_interval: float = 60.0,
+    warn: Callable[[str], None] | None = None,
+    response: bool | None = None,
+) -> xr.Dataset:
     """Simulate a scene and return the pressures on the lining through time.
 
     Parameters
     ----------
-    scene : coupling.Scene or None
-        From :func:`coupling.load_scene`. None: that of the run to resume.
+    scene : coupling.Scene, str, path or None
+        A scene, which is validated once more (`model_copy` does not), or what :func:`coupling.load_scene` takes: the
+        name of a built-in one, or a file. None: that of the run to resume.
     out : str, path or None
         Folder for `run.nc` (written as the run goes on), `mesh.vtu`, `scene.toml`, `run.log` and `figures/`.
         None: `runs/<scene>` in the current folder, numbered when that one is taken.
     overwrite : bool
         Replace an earlier run in `out`.
-    progress : callable or None
-        Called a few times a second with a dict: stage ("mesh", "relax", "gush", "respond", "figures"), time [s],
-        inflow_mass [kg/m], dt [s], dt_limit, point_steps_per_second, step, residual.
+    progress : callable, bool or None
+        True: a line that says how far the run is, see :class:`coupling.progress_line.ProgressLine`; None: such a line
+        in a notebook, and nothing elsewhere. A function is called a few times a second with a dict: stage ("mesh",
+        "relax", "gush", "respond", "figures"), time [s], inflow_mass [kg/m], dt [s], dt_limit,
+        point_steps_per_second, step, residual.
     threads : int or None
         None: all cores. The result does not depend on it.
     figures : bool
-        Also compute the response of the scene's ring into `/structure/beam-spring` and draw all pictures.
+        Also draw all pictures.
     resume : bool
         Continue the run in `out`, however it was stopped, to the bits that it would have had uninterrupted.
     checkpoint_interval : float
         Wall time between checkpoints [s].
     warn : callable or None
         Called with what a user should know and the log says too: unusual numbers, damaged files, another processor.
+        None: each is a Python warning, a :class:`structure.GushingWarning`.
+    response : bool or None
+        Also compute the forces in the scene's ring, into `/structure/beam_spring`; None: with the pictures.
 
     Returns
     -------
@@ -54,9 +84,11 @@ def run(
 
     Raises
     ------
+    coupling.SceneError
+        Not a scene, or one that can not be run.
     RunRefused
         Before anything starts: folder in use, not writable, not empty; too little memory; nothing to resume, or with
-        another scene or version.
+        another scene or version; arguments of a wrong type.
     mpm.RunFailed
         Non-finite values or no initial equilibrium; the file stays readable, with status 'failed'.
     KeyboardInterrupt
@@ -64,78 +96,108 @@ def run(
     OSError
         Disk full, for instance; the same.
     """
+    _check_arguments(out, progress, threads, checkpoint_interval, warn)
     if resume and (out is None or overwrite):
         raise RunRefused("--resume: needs the folder of the run, and no --overwrite; give it as --out DIR")
+    given = None if scene is None else as_scene(scene)
     if not resume:
-        if scene is None:
-            raise RunRefused("scene: must be given unless a run is resumed; load one with coupling.load_scene")
-        check_memory(scene.mpm)
-        out = default_folder(scene.name) if out is None else out
-    report = progress if progress is not None else lambda state: None
+        if given is None:
+            raise RunRefused("scene: must be given unless a run is resumed; name a built-in one, as 'quick'")
+        check_memory(given.mpm)
+        out = default_folder(given.name) if out is None else out
     held = reopened(out) if resume else claimed(out, overwrite)
-    with held as folder, _logged_to(folder / LOG_FILE):
-        remains = find_remains(folder, scene, _teller(warn)) if resume else None
+    with held as folder, _logged_to(folder / LOG_FILE), _shown(progress) as report:
+        remains = find_remains(folder, given, _teller(warn)) if resume else None
         if remains is not None:
-            scene = remains.scene
-            check_memory(scene.mpm)
+            chosen: Scene = remains.scene
+            check_memory(chosen.mpm)
         else:
-            for warning in warnings_of(scene):
+            chosen = given
+            for warning in warnings_of(chosen):
                 _teller(warn)(warning)
         if remains is not None and remains.finished:
             remove_checkpoints(folder)
         else:
-            RecordedSimulation(scene, folder, report, threads, checkpoint_interval, remains).run()
+            RecordedSimulation(chosen, folder, report, threads, checkpoint_interval, remains).run()
         try:
-            if figures:
-                finish(scene, folder, report)
+            finish(chosen, folder, report, figures if response is None else response, figures)
         finally:
             for warning in poor_errors(stored_quality(read_attributes(folder))):
                 _teller(warn)(warning)
         pressures = read_pressures(folder)
-    pressures.attrs |= {"run": str(folder), "scene_name": scene.name}
+    pressures.attrs |= {"run": str(folder), "scene_name": chosen.name}
     return pressures
+
+
+def _check_arguments(out, progress, threads, checkpoint_interval, warn):
+    try:
+        check_threads(threads)
+    except ValueError as problem:
+        raise RunRefused(str(problem)) from None
+    if out is not None and not isinstance(out, str | os.PathLike):
+        raise RunRefused(f"out: must be the path of a folder, got {out!r}; leave it out for runs/SCENE")
+    shown = None if isinstance(progress, bool) else progress
+    for name, function in (("progress", shown), ("warn", warn)):
+        if function is not None and not callable(function):
+            raise RunRefused(f"{name}: must be a function, got {function!r}; give one that takes what it is told")
+    if isinstance(checkpoint_interval, bool) or not isinstance(checkpoint_interval, numbers.Real):
+        raise RunRefused(f"checkpoint_interval: must be a number of seconds, got {checkpoint_interval!r}; give e.g. 60")
+    if not checkpoint_interval >= 0:
+        raise RunRefused(f"checkpoint_interval: must not be negative, got {checkpoint_interval!r} s; give e.g. 60")
 
 
 def _teller(warn):
     def tell(message):
         log.warning("%s", message)
-        if warn is not None:
-            warn(message)
+        (warn if warn is not None else warn_in_python)(message)
 
     return tell
 
 
-def finish(scene, folder, progress):
-    """Response of the ring to a run's pressures and all pictures; returns the paths of the pictures.
+def _shown(progress):
+    """What is told of the progress, as a context."""
+    if callable(progress):
+        return contextlib.nullcontext(progress)
+    return ProgressLine(quiet=not (in_notebook() if progress is None else progress))
+
+
+def finish(
+    scene: Scene, folder: Path, progress: Callable[[dict[str, Any]], None], response: bool = True, figures: bool = True
+) -> list[Path]:
+    """Response of the ring to a run's pressures and all pictures, where asked for; returns the paths of the pictures.
 
     Raises
     ------
     RunRefused, structure.LiningFailure
-        As :func:`respond`, once the pictures of the ground are drawn.
+        As :func:`respond`, after the pictures of the ground have been drawn.
     """
-    from coupling.figures import draw_run
     from structure import LiningFailure
 
     failure = None
-    if scene.ring is not None and scene.mpm.tunnels:
+    if response and scene.ring is not None and scene.mpm.tunnels:
         progress({"stage": "respond"})
         try:
-            response = respond(scene, read_pressures(folder))
-            write_response(folder / RUN_FILE, response)
-            write_quality(folder / RUN_FILE, response)
+            answer = respond(scene, read_pressures(folder))
+            write_response(folder / RUN_FILE, answer)
+            write_quality(folder / RUN_FILE, answer)
             respond_beside(scene, folder)
         except (RunRefused, LiningFailure) as problem:
             log.error("ring: %s", problem)
             failure = problem
-    progress({"stage": "figures"})
-    pictures = draw_run(folder, folder / FIGURES)
+    pictures = []
+    if figures:
+        from coupling.figures import draw_run
+
+        progress({"stage": "figures"})
+        pictures = draw_run(folder, folder / FIGURES)
     if failure is not None:
-        failure.add_note(f"the ground is computed and drawn in {folder}; change the ring, then: gush respond {folder}")
+        drawn = " and drawn" if figures else ""
+        failure.add_note(f"the ground is computed{drawn} in {folder}; change the ring, then: gush respond {folder}")
         raise failure
     return pictures
 
 
-def respond(scene, pressures, backend="beam-spring", tunnel=None):
+def respond(scene: Scene, pressures: xr.Dataset, backend: str = "beam-spring", tunnel: int | None = None) -> xr.Dataset:
     """Response of the scene's ring to the pressures on a tunnel, by the lining model of that name.
 
     tunnel : int or None, None: the one with the gate.
@@ -162,7 +224,7 @@ def gate_tunnel(scene):
     return scene.mpm.gate.tunnel if scene.mpm.gate else 0
 
 
-def respond_beside(scene, folder, backend="beam-spring"):
+def respond_beside(scene: Scene, folder: Path, backend: str = "beam-spring") -> list[int]:
     """Store the responses of the tunnels without the gate, each of its own ring; returns their numbers."""
     if scene.ring is None:
         return []
@@ -173,7 +235,7 @@ def respond_beside(scene, folder, backend="beam-spring"):
     return others
 
 
-def respond_by_name(ring, pressures, backend, **options):
+def respond_by_name(ring: Ring, pressures: xr.Dataset, backend: str, **options: Any) -> xr.Dataset:
     """Response of a ring by the lining model of that name; `options` go to the model.
 
     Raises
@@ -190,7 +252,7 @@ def respond_by_name(ring, pressures, backend, **options):
         raise RunRefused(str(problem)) from problem
 
 
-def check_memory(mpm_scene):
+def check_memory(mpm_scene: MpmScene) -> None:
     """Refuse a scene whose mesh and points would not fit into the memory that is free."""
     free, need = free_memory_bytes(), mpm_scene.estimated_elements * BYTES_PER_ELEMENT
     if free is not None and need > 0.8 * free:
@@ -200,7 +262,7 @@ def check_memory(mpm_scene):
         )
 
 
-def free_memory_bytes():
+def free_memory_bytes() -> int | None:
     """Memory that a new process can use without swapping; None where the system does not tell."""
     with contextlib.suppress(OSError, ValueError), open("/proc/meminfo", encoding="ascii") as lines:
         for line in lines:

@@ -3,6 +3,8 @@
 import contextlib
 import fcntl
 import os
+import shlex
+import time as clock
 from pathlib import Path
 
 from coupling.checkpoint import remove_checkpoints
@@ -10,6 +12,7 @@ from coupling.checkpoint import remove_checkpoints
 RUN_FILE, MESH_FILE, SCENE_FILE, LOG_FILE, FIGURES = "run.nc", "mesh.vtu", "scene.toml", "run.log", "figures"
 REPORT_FILE, FIELDS = "report.html", "fields"
 LOCK_FILE = ".lock"
+TRIES, SECONDS_BETWEEN_TRIES = 5, 0.02  # for a lock that a look at it may hold for an instant
 
 
 class RunRefused(ValueError):
@@ -108,9 +111,7 @@ def _lock(folder):
             raise RunRefused(
                 f"output folder '{folder}': not writable: {error.strerror}; choose another --out or change its rights"
             ) from None
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
+        if not _taken(lock):
             holder = os.read(lock, 20).decode(errors="replace").strip()
             os.close(lock)
             raise RunRefused(
@@ -124,6 +125,35 @@ def _lock(folder):
                 os.write(lock, f"{os.getpid()}\n".encode())
                 return lock
         os.close(lock)
+
+
+def _taken(lock):
+    for _ in range(TRIES):
+        with contextlib.suppress(OSError):
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return True
+        clock.sleep(SECONDS_BETWEEN_TRIES)
+    return False
+
+
+def in_use(folder):
+    """Whether a process holds the folder of a run: the system drops the lock of one that was killed."""
+    try:
+        lock = os.open(Path(folder) / LOCK_FILE, os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError:
+        return True
+    finally:
+        os.close(lock)
+    return False
+
+
+def how_to_go_on(folder):
+    """The command that continues the run in a folder."""
+    return f"gush run --resume --out {shlex.quote(str(folder))}"
 
 
 def _content(folder):

@@ -7,9 +7,9 @@ tunnel with the gate, ``[ring.ground]`` from the soil at that tunnel's axis (see
 """
 
 import difflib
+import html
 import json
 import math
-import reprlib
 import tomllib
 from functools import cached_property
 from importlib import resources
@@ -17,12 +17,13 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, ValidationError, model_validator
 
 from coupling.plausibility import hints, shown
 from coupling.ring_units import ring_in_si, ring_number
 from coupling.scene_lines import entry_at, holds, line_of, path_of
 from mpm.scene import Scene as MpmScene
+from structure.inputs import Input, InputError, mistakes, models_in, shortened, table_html
 from structure.ring import Ring
 
 # No scene is longer; a larger file is something else.
@@ -30,6 +31,7 @@ MOST_BYTES = 1_000_000
 # The deepest key of a scene is ring.ground.law; what is much deeper is no scene and would overflow the stack.
 MOST_LEVELS = 12
 CHANGES = "changes in Python"
+ADVICE = "no default, see the built-in case-3 for an example"
 # Keys of [ring] and [ring.ground] that follow from the ground when left out.
 DERIVED = (
     "outer_diameter",
@@ -43,7 +45,7 @@ DERIVED = (
 )
 
 
-class SceneError(ValueError):
+class SceneError(InputError):
     """A scene that can not be run: rule, name, value, remedy, one line a mistake."""
 
 
@@ -58,10 +60,8 @@ class Layer(NamedTuple):
     data: dict[str, Any]
 
 
-class Scene(BaseModel):
+class Scene(Input):
     """A complete scene: `mpm` for the ground and the gate, `ring` for the structure (None: no ring is computed)."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     mpm: MpmScene
     ring: Ring | None = None
@@ -71,13 +71,53 @@ class Scene(BaseModel):
         """Name of the scene."""
         return self.mpm.name
 
+    def __repr__(self) -> str:
+        from coupling.report.scene_facts import facts
+
+        rows = facts(self)
+        width = max(len(what) for what, _ in rows)
+        return "\n".join([f"scene '{self.name}'", *(f"  {what:{width}}  {value}" for what, value in rows)])
+
+    __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        from coupling.report.scene_facts import facts
+
+        text = f"<details><summary>the complete scene</summary><pre>{html.escape(self.source)}</pre></details>"
+        rows = {what: html.escape(value) for what, value in facts(self)}
+        return table_html(f"scene '{self.name}'", rows) + text
+
     @cached_property
     def source(self) -> str:
         """The scene as TOML text, complete: every number, defaults included, without a base."""
-        data = self.mpm.model_dump(exclude_none=True)
+        head = f"# Scene '{self.name}', complete, in SI units and degrees.\n"
+        return head + "\n".join(_toml_lines(self.nested())) + "\n"
+
+    def nested(self) -> dict[str, Any]:
+        """The scene as the nested dictionary of its complete TOML file, for :func:`make_scene`."""
+        data = self.mpm.model_dump(exclude_none=True, warnings=False)
         if self.ring is not None:
-            data["ring"] = self.ring.model_dump(exclude_none=True)
-        return f"# Scene '{self.name}', complete, in SI units and degrees.\n" + "\n".join(_toml_lines(data)) + "\n"
+            data["ring"] = self.ring.model_dump(exclude_none=True, warnings=False)
+        return data
+
+    def changed(self, **changes: Any) -> "Scene":
+        """The scene with other values, validated; what of the ring follows from the ground follows it again.
+
+        Parameters
+        ----------
+        **changes
+            As of :func:`load_scene`: ``scene.changed(stop={"inflow_mass": 50.0})``.
+
+        Raises
+        ------
+        SceneError
+            Invalid values; every mistake found is named.
+        """
+        data = self.nested()
+        if "ring" in data:
+            data["ring"] = _without(data["ring"], derived_ring(self.mpm))
+        _check_levels(changes, f"changes of scene {self.name!r}")
+        return make_scene(_merged((*_change_layers(changes), Layer(self.name, "", data))), self.name)
 
     @model_validator(mode="after")
     def _check(self) -> "Scene":
@@ -96,7 +136,7 @@ class Scene(BaseModel):
             if gate.width >= segment:
                 raise ValueError(
                     f"gate: width must be below the shortest segment of the ring ({segment:.3g} m on its inner face), "
-                    f"got {gate.width:g} m; the gap lies in or between segments, give e.g. 0.2"
+                    f"got {gate.width:g} m; the gate lies in or between segments, give e.g. 0.2"
                 )
         return self
 
@@ -131,7 +171,7 @@ def load_scene(name: str | Path, /, **changes: Any) -> Scene:
     layers = _read(str(name), ())
     _check_levels(changes, f"changes of scene {str(name)!r}")
     # changes come from no file: a layer without a text keeps the lines of the files from being blamed
-    layers = (*(Layer(CHANGES, "", nested(key, value)) for key, value in reversed(changes.items())), *layers)
+    layers = (*_change_layers(changes), *layers)
     return make_scene(_merged(layers), str(name), layers)
 
 
@@ -144,6 +184,31 @@ def read_scene_data(name: str | Path) -> dict[str, Any]:
         Unknown name or unreadable file.
     """
     return _merged(_read(str(name), ()))
+
+
+def as_scene(scene: Any) -> Scene:
+    """A valid scene from what a caller has: a scene, which is validated once more, or the name or file of one.
+
+    Raises
+    ------
+    SceneError
+        As :func:`load_scene`; or what is given is neither.
+    """
+    if isinstance(scene, str | Path):
+        return load_scene(scene)
+    if isinstance(scene, MpmScene):
+        raise SceneError(
+            f"scene '{scene.name}': must be a coupling.Scene, got its part for the ground, an mpm.Scene; "
+            "give coupling.Scene(mpm=..), with ring=.. where forces in the ring are wanted"
+        )
+    if isinstance(scene, dict):
+        return make_scene(scene)
+    if not isinstance(scene, Scene):
+        raise SceneError(
+            f"scene: must be a coupling.Scene, the name of a built-in one or a file, got {shortened(scene)}; "
+            "load one: coupling.load_scene('quick')"
+        )
+    return make_scene(scene.nested(), str(getattr(scene.mpm, "name", "scene")))
 
 
 def parse_scene(text: str, origin: str) -> Scene:
@@ -164,7 +229,7 @@ def make_scene(data: dict[str, Any], origin: str = "scene", layers: tuple[Layer,
     Parameters
     ----------
     data : dict
-        Tables ``box``, ``water``, ``soils`` .. of `mpm.Scene`, and ``ring`` of `structure.Ring`.
+        Tables ``box``, ``water``, ``soils`` .. of `mpm.Scene`, ``ring`` of `structure.Ring`, and ``base`` as in a file.
     origin : str
         What the message of an error starts with.
     layers : tuple of Layer
@@ -181,6 +246,10 @@ def make_scene(data: dict[str, Any], origin: str = "scene", layers: tuple[Layer,
             "give the nested dictionary of its TOML file"
         )
     _check_levels(data, f"scene {origin!r}")
+    if "base" in data:
+        below = _read_base(data["base"], origin, ())
+        data = _merged((Layer(origin, "", {key: value for key, value in data.items() if key != "base"}), *below))
+        layers = (*layers, *below)
     whole, data = data, dict(data)
     ring_data = data.pop("ring", None)
     problems = _truth_values(data, MpmScene, ())
@@ -190,24 +259,27 @@ def make_scene(data: dict[str, Any], origin: str = "scene", layers: tuple[Layer,
     try:
         mpm_scene = MpmScene.model_validate(data)
     except ValidationError as error:
-        problems += _messages(error, MpmScene, (), extra_names=("ring", "base"))
+        problems += mistakes(error, MpmScene, extra_names=("ring", "base"), advice=ADVICE)
     if ring_data is not None:
         if not isinstance(ring_data, dict):
-            problems.append((("ring",), f"must be a table, got {_short(ring_data)}; write [ring] with its keys below"))
+            problems.append(
+                (("ring",), f"must be a table, got {shortened(ring_data)}; write [ring] with its keys below")
+            )
         else:
             derived = {} if mpm_scene is None else derived_ring(mpm_scene)
-            ring_data, mistakes = ring_in_si(ring_data)
-            problems += mistakes
+            ring_data, wrong = ring_in_si(ring_data)
+            problems += wrong
             try:
-                ring = Ring.model_validate(changed(derived, ring_data)) if not mistakes else None
+                ring = Ring.model_validate(changed(derived, ring_data)) if not wrong else None
             except ValidationError as error:
                 # Without a valid ground there is nothing to derive the missing keys from.
-                problems += _messages(error, Ring, ("ring",), silent=() if derived else DERIVED)
+                found = mistakes(error, Ring, silent=() if derived else DERIVED, advice=ADVICE)
+                problems += [(("ring", *location), message) for location, message in found]
     if not problems and mpm_scene is not None:
         try:
-            return Scene(mpm=mpm_scene, ring=ring)
+            return Scene.model_validate({"mpm": mpm_scene, "ring": ring})
         except ValidationError as error:
-            problems += _messages(error, Scene, ())
+            problems += mistakes(error, Scene)
     unusual = hints(whole)
     lines = [f"scene {origin!r} has {len(problems)} mistake{'s' * (len(problems) > 1)}:"]
     lines += [_line(location, message, whole, origin, layers, unusual) for location, message in problems]
@@ -247,7 +319,7 @@ def ring_of(scene: Scene, tunnel: int) -> Ring:
     try:
         return Ring.model_validate(values)
     except ValidationError as error:
-        said = "; ".join(message for _, message in _messages(error, Ring, ()))
+        said = "; ".join(message for _, message in mistakes(error, Ring))
         raise SceneError(f"scene '{scene.name}', ring of tunnel {tunnel}: {said}") from None
 
 
@@ -287,13 +359,18 @@ def _read(name: str, chain: tuple[str, ...]) -> tuple[Layer, ...]:
     layer = Layer(name, text, data)
     if base is None:
         return (layer,)
+    return (layer, *_read_base(base, name, chain))
+
+
+def _read_base(base: Any, name: str, chain: tuple[str, ...]) -> tuple[Layer, ...]:
+    """The texts of the base that the scene `name` states."""
     if not isinstance(base, str):
         raise SceneError(
-            f"scene {name!r}: base must be the name or file of a scene, got {_short(base)}; write base = 'case-3'"
+            f"scene {name!r}: base must be the name or file of a scene, got {shortened(base)}; write base = 'case-3'"
         )
     # A file's base is looked up beside it, wherever the program was started.
     beside = Path(name).parent / base
-    return (layer, *_read(base if base in scene_names() or not _is_there(beside) else str(beside), (*chain, name)))
+    return _read(base if base in scene_names() or not _is_there(beside) else str(beside), (*chain, name))
 
 
 def nested(name: str, value: Any) -> dict[str, Any]:
@@ -305,6 +382,11 @@ def nested(name: str, value: Any) -> dict[str, Any]:
     for part in reversed(name.split(".")):
         value = {part: value}
     return value
+
+
+def _change_layers(changes: dict[str, Any]) -> list[Layer]:
+    """Changes in Python as the layers that they are, the last one first."""
+    return [Layer(CHANGES, "", nested(key, value)) for key, value in reversed(changes.items())]
 
 
 def number_in_unit(name: str, value: Any) -> Any:
@@ -321,7 +403,7 @@ def number_in_unit(name: str, value: Any) -> Any:
             return ring_number(tuple(parts), value)
         model = MpmScene
         for part in parts[:-1]:
-            model = next(_models_in(model.model_fields[part].annotation))
+            model = next(models_in(model.model_fields[part].annotation))
         field = model.model_fields[parts[-1]]
     except (KeyError, StopIteration):
         return value  # no such key: the scene says so
@@ -345,7 +427,7 @@ def parse_changes(texts: list[str]) -> dict[str, Any]:
     for text in texts:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not (name and equals and value):
-            raise SceneError(f"--set {_short(text)}: must be NAME=VALUE; write it like --set gate.angle=45")
+            raise SceneError(f"--set {shortened(text)}: must be NAME=VALUE; write it like --set gate.angle=45")
         try:
             found[name] = tomllib.loads(f"value = {value}")["value"]
         except tomllib.TOMLDecodeError:  # a name or a quantity without quotes, as the shell hands it over
@@ -409,7 +491,7 @@ def _read_file(name: str) -> str:
         near = difflib.get_close_matches(name, scene_names(), 1)
         hint = f"did you mean {near[0]!r}? " if near else ""
         raise SceneError(
-            f"scene {_short(name)}: must be a built-in scene or a file, got neither; {hint}"
+            f"scene {shortened(name)}: must be a built-in scene or a file, got neither; {hint}"
             f"built-in: {', '.join(scene_names())}"
         )
     return read_toml_file(path, f"scene {name!r}")
@@ -439,6 +521,17 @@ def read_toml_file(path: Path, who: str) -> str:
 #: Tables that a scene may leave out although its base has them: `water = "none"` makes it dry.
 OPTIONAL_TABLES = ("water", "gate", "ring")
 NONE = "none"
+
+
+def _without(table: dict[str, Any], derived: dict[str, Any]) -> dict[str, Any]:
+    """A table less the entries that only say what is derived anyway."""
+    kept = {}
+    for key, value in table.items():
+        if isinstance(value, dict) and isinstance(derived.get(key), dict):
+            kept[key] = _without(value, derived[key])
+        elif key not in derived or value != derived[key]:
+            kept[key] = value
+    return kept
 
 
 def changed(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
@@ -471,19 +564,12 @@ def _with_entries(name: str, entries: list[Any] | tuple[Any, ...], changes: dict
         number = int(key) if str(key).isdecimal() else len(result)
         if number >= len(result):
             raise SceneError(
-                f"{name}.{_short(str(key))[1:-1]}: must be a number below {len(result)}, the length of that list; as "
-                f"in {name}.0"
+                f"{name}.{shortened(str(key))[1:-1]}: must be a number below {len(result)}, the length of that list; "
+                f"as in {name}.0"
             )
         here = result[number]
         result[number] = changed(here, value) if isinstance(here, dict) and isinstance(value, dict) else value
     return result
-
-
-def _short(value: Any) -> str:
-    """A value as a message shows it, never long."""
-    shortened = reprlib.Repr()
-    shortened.maxstring = shortened.maxother = shortened.maxlong = 60
-    return shortened.repr(value)
 
 
 def _line(
@@ -528,7 +614,7 @@ def _truth_values(data: Any, model: type[BaseModel], location: tuple[Any, ...]) 
         field, where = model.model_fields.get(key) if isinstance(key, str) else None, (*location, key)
         if field is None:
             continue
-        inner = next(_models_in(field.annotation), None)
+        inner = next(models_in(field.annotation), None)
         entries = enumerate(value) if isinstance(value, list | tuple) else [(None, value)]
         for index, entry in entries:
             at = where if index is None else (*where, index)
@@ -537,98 +623,6 @@ def _truth_values(data: Any, model: type[BaseModel], location: tuple[Any, ...]) 
             elif inner is not None:
                 found += _truth_values(entry, inner, at)
     return found
-
-
-def _messages(
-    error: ValidationError,
-    model: type[BaseModel],
-    prefix: tuple[Any, ...],
-    *,
-    silent: tuple[str, ...] = (),
-    extra_names: tuple[str, ...] = (),
-) -> list[tuple[tuple[Any, ...], str]]:
-    """Location and message of every mistake: rule, value, remedy."""
-    found = []
-    missing: dict[tuple[Any, ...], list[str]] = {}
-    for item in error.errors(include_url=False):
-        if item["type"] == "missing":
-            if item["loc"][-1] not in silent:
-                missing.setdefault(item["loc"][:-1], []).append(str(item["loc"][-1]))
-            continue
-        if item["type"] == "too_short" and item["input"]:
-            # Only the echo of the mistakes inside its entries.
-            continue
-        found.append(((*prefix, *item["loc"]), _message(item, model, extra_names)))
-    advice = "no default, see the built-in case-3 for an example"
-    for name in missing.pop((), []):
-        found.append(((*prefix, name), f"missing; it decides the answer and has {advice}"))
-    for table, names in missing.items():
-        # A soil is where newcomers change one number and lose the others.
-        whole = (
-            f"; [[{table[0]}]] replaces all {table[0]} of the base, so copy all keys of it, or change the entry of the "
-            f"base by [{table[0]}.{table[1]}]"
-            if len(table) > 1
-            else ""
-        )
-        them = "it decides the answer and has" if len(names) == 1 else "they decide the answer and have"
-        text = f"{', '.join(names)} missing; {them} {advice}{whole}"
-        found.append(((*prefix, *table), text))
-    return found
-
-
-def _message(item: Any, model: type[BaseModel], extra_names: tuple[str, ...]) -> str:
-    kind, value = item["type"], item["input"]
-    if kind == "extra_forbidden":
-        here = [*_names_at(model, item["loc"][:-1]), *(extra_names if len(item["loc"]) == 1 else ())]
-        near = difflib.get_close_matches(str(item["loc"][-1]), here, 1)
-        return f"unknown key, got {_short(value)}; " + (
-            f"did you mean {near[0]!r}?" if near else f"known: {', '.join(here)}"
-        )
-    message = item["msg"].removeprefix("Value error, ")
-    if kind == "value_error":
-        return message
-    rule = message.replace("Input should", "must", 1)
-    if kind in ("model_type", "dict_type"):
-        rule = "must be a table"
-    limits = item.get("ctx", {})
-    given = _short(value) if isinstance(value, str | int | float) else f"a {type(value).__name__}"
-    if kind == "too_short":
-        return f"must have at least {limits['min_length']} entry, got {_short(value)}; add one"
-    if kind == "too_long":
-        return f"must have at most {limits['max_length']} entries, got {len(value)}; merge or leave out some"
-    if kind == "string_pattern_mismatch":
-        return f"must be letters, digits and the like, beginning with a letter or digit, got {given}; rename it"
-    if kind == "literal_error" and isinstance(value, str):
-        near = difflib.get_close_matches(value.lower(), limits["expected"].replace("'", "").split(" or "), 1)
-        return f"{rule}, got {given}; " + (f"did you mean {near[0]!r}?" if near else "choose one of these")
-    remedy = next(
-        (f"give a value {sign} {limits[key]:g}" for key, sign in _LIMITS.items() if key in limits), "correct it"
-    )
-    if kind == "float_parsing":
-        remedy = "give a plain number"
-    return f"{rule}, got {given}; {remedy}"
-
-
-_LIMITS = {"gt": "above", "ge": "from", "lt": "below", "le": "up to"}
-
-
-def _names_at(model: type[BaseModel], location: tuple[Any, ...]) -> list[str]:
-    """Keys known in the table at `location`."""
-    for part in location:
-        if isinstance(part, int):
-            continue
-        models = list(_models_in(model.model_fields[part].annotation))
-        if not models:
-            return []
-        model = models[0]
-    return list(model.model_fields)
-
-
-def _models_in(annotation: Any) -> Any:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    for argument in getattr(annotation, "__args__", ()):
-        yield from _models_in(argument)
 
 
 def _toml_lines(data: dict[str, Any], path: str = "") -> list[str]:

@@ -1,15 +1,23 @@
 """What a run came to, in a few numbers: the table and the JSON of `gush run` and `gush respond`."""
 
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from coupling.datasets import read_attributes, read_history, read_pressures
 from coupling.quality import quality, verdicts
 from mpm.variables import CLAMPS
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 PLACES = {"crown": 0, "right waist": 90, "invert": 180, "left waist": 270}
 
 
-def summarise_run(run):
+def summarise_run(run: str | Path) -> dict[str, Any]:
     """Numbers of a run for people and programs.
 
     Returns
@@ -77,7 +85,7 @@ def _at_places(pressures):
     }
 
 
-def summarise_response(response):
+def summarise_response(response: xr.Dataset) -> dict[str, Any]:
     """Extreme internal forces and joint deformations, initial and final.
 
     Returns

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-TOPOLOGIES = {"vertex": "Polyvertex", "triangle": "Triangle"}
+TOPOLOGIES = {"vertex": "Polyvertex", "triangle": "Triangle", "quad": "Quadrilateral"}
 NUMBERS = {"f": "Float", "i": "Int", "u": "UInt"}
-KINDS = {1: "Scalar", 2: "Vector"}
+KINDS = {1: "Scalar", 3: "Vector", 9: "Tensor"}  # by numbers a place
 
 
 class XdmfSeries:
@@ -48,8 +48,8 @@ class XdmfSeries:
         time : float
             [s]
         mesh : meshio.Mesh
-            One block of cells, "vertex" or "triangle"; points (n, 3); data are scalars or vectors. Arrays that are the
-            same object as at an earlier time are not written again.
+            One block of cells of `TOPOLOGIES`; points (n, 3); data are scalars, vectors or tensors (n, 9). Arrays that
+            are the same object as at an earlier time are not written again.
         """
         grid = ET.SubElement(self._series, "Grid", Name=f"{time:.6g} s", GridType="Uniform")
         ET.SubElement(grid, "Time", Value=repr(float(time)))
@@ -66,7 +66,8 @@ class XdmfSeries:
             self._attribute(grid, name, "Cell", values)
 
     def _attribute(self, grid, name, centre, values):
-        self._item(ET.SubElement(grid, "Attribute", Name=name, AttributeType=KINDS[values.ndim], Center=centre), values)
+        width = 1 if values.ndim == 1 else values.shape[1]
+        self._item(ET.SubElement(grid, "Attribute", Name=name, AttributeType=KINDS[width], Center=centre), values)
 
     def _item(self, parent, values):
         # keeps a reference, so that an identity is not given to another array

@@ -231,17 +231,17 @@ class Tunnel(Part):
         return self
 
     @property
-    def outer_radius(self):
+    def outer_radius(self) -> float:
         """[m]"""
         return self.outer_diameter / 2
 
     @property
-    def inner_radius(self):
+    def inner_radius(self) -> float:
         """[m]"""
         return self.inner_diameter / 2
 
     @property
-    def axis_depth(self):
+    def axis_depth(self) -> float:
         """Depth of the axis below the surface [m]."""
         return self.cover + self.outer_radius
 
@@ -509,7 +509,7 @@ class Scene(Part):
             )
 
     @property
-    def asymmetry(self):
+    def asymmetry(self) -> str | None:
         """What forbids to compute the half x >= 0 only, in words; None where the scene is its own mirror image."""
         if len(self.tunnels) != 1:
             return f"{len(self.tunnels)} tunnels, a half model has one at x = 0"
@@ -525,21 +525,21 @@ class Scene(Part):
         return None
 
     @property
-    def is_two_phase(self):
+    def is_two_phase(self) -> bool:
         """Whether there is water with a velocity of its own."""
         return self.water is not None and self.water.drainage == "two-phase"
 
     @property
-    def is_undrained(self):
+    def is_undrained(self) -> bool:
         """Whether there is water that moves with the grains."""
         return self.water is not None and self.water.drainage == "undrained"
 
     @property
-    def is_half(self):
+    def is_half(self) -> bool:
         """Whether only x >= 0 is computed."""
         return self.symmetry == "half" or (self.symmetry == "auto" and self.asymmetry is None)
 
-    def lining_of(self, tunnel):
+    def lining_of(self, tunnel: Tunnel) -> str:
         """How a tunnel's lining stands in the ground: its own choice, else that of the scene."""
         return tunnel.lining or self.lining
 
@@ -562,7 +562,7 @@ class Scene(Part):
             )
 
     @cached_property
-    def estimated_elements(self):
+    def estimated_elements(self) -> float:
         """Rough number of elements that are computed, from the integral of the inverse cell area, four a cell [-]."""
         d = self.discretisation
         growth = d.growth
@@ -580,7 +580,7 @@ class Scene(Part):
         return 2 * cells if self.is_half else 4 * cells
 
     @property
-    def estimated_bytes(self):
+    def estimated_bytes(self) -> float:
         """Memory of a run [bytes]: an element's mesh, adjacency and buffers, a point's state and two copies."""
         return self.estimated_elements * (1500 + 600 * self.discretisation.points_per_element)
 

@@ -1,8 +1,12 @@
 """A whole event: initial state, gate opens, records of interval means until the stop criterion."""
 
+from __future__ import annotations
+
 import json
 import time as clock
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +16,10 @@ from mpm.meshing import build_mesh
 from mpm.solver import RunFailed, Solver
 from mpm.state import restore_solver, solver_state
 from mpm.variables import CLAMPS
+
+if TYPE_CHECKING:
+    from mpm.mesh import Mesh
+    from mpm.scene import Scene
 
 STEPS_BETWEEN_CHECKS = 50
 SECONDS_BETWEEN_REPORTS = 0.25
@@ -33,7 +41,7 @@ class Record:
     dt: float
     dt_limit: str
     steps: int
-    lining: list
+    lining: list = field(repr=False)
     inflow_mass: float
     flow_zone_area: float
     disturbed_area: float
@@ -42,15 +50,20 @@ class Record:
     tip_fraction: float
     kinetic_energy: float
     max_velocity: float
-    clamp_counts: dict
-    balances: dict
-    errors: dict
+    clamp_counts: dict = field(repr=False)
+    balances: dict = field(repr=False)
+    errors: dict = field(repr=False)
     point_steps: int
     cpu_seconds: float
-    points: dict | None
+    points: dict | None = field(repr=False)
 
 
-def simulate(scene, mesh=None, threads=None, progress=None):
+def simulate(
+    scene: Scene,
+    mesh: Mesh | None = None,
+    threads: int | None = None,
+    progress: Callable[[dict[str, Any]], None] | None = None,
+) -> Iterator[Record]:
     """Run a scene and yield one `Record` per output interval, the relaxed initial state first.
 
     Parameters and errors as of :class:`Simulation`.
@@ -80,7 +93,13 @@ class Simulation:
         Whether the stop criterion is reached and the last record returned.
     """
 
-    def __init__(self, scene, mesh=None, threads=None, progress=None):
+    def __init__(
+        self,
+        scene: Scene,
+        mesh: Mesh | None = None,
+        threads: int | None = None,
+        progress: Callable[[dict[str, Any]], None] | None = None,
+    ) -> None:
         self.scene = scene
         self.solver = Solver(scene, mesh if mesh is not None else build_mesh(scene), threads)
         self.done = False
@@ -95,7 +114,7 @@ class Simulation:
         self._progress = progress
         self._last_report = clock.monotonic(), 0
 
-    def begin(self):
+    def begin(self) -> Record:
         """Settle the initial state, open the gate, and return the `Record` of the state before that.
 
         Raises
@@ -122,7 +141,7 @@ class Simulation:
         self._last_report = clock.monotonic(), solver.point_steps
         return record
 
-    def advance(self, pause=None):
+    def advance(self, pause: Callable[[], bool] | None = None) -> Record | None:
         """Step to the end of the interval at hand and return its `Record`, or None where `pause` asked to stop.
 
         Parameters
@@ -190,7 +209,7 @@ class Simulation:
         ahead = STEPS_BETWEEN_CHECKS * shortest + longest
         self._near = target is not None and solver.inflow_mass(ahead) >= target
 
-    def state(self):
+    def state(self) -> dict[str, Any]:
         """All that decides how the simulation goes on, and its processor time so far.
 
         Returns
@@ -215,7 +234,7 @@ class Simulation:
             "cpu_seconds": self.cpu_seconds,
         }
 
-    def restore(self, state):
+    def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `state` of the same scene and mesh, in place of `begin`: the same bits from here on.
 
         Raises
@@ -235,7 +254,7 @@ class Simulation:
         self._last_report = clock.monotonic(), self.solver.point_steps
 
     @property
-    def cpu_seconds(self):
+    def cpu_seconds(self) -> float:
         """Processor time of the simulation, that before it was restored included [s]."""
         return clock.process_time() - self._cpu_begin
 

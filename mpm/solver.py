@@ -51,7 +51,7 @@ from mpm.points import (
 )
 from mpm.spectrum import Spectrum, spectral_time_step
 from mpm.tables import element_geometry, element_neighbours, outflow_nodes, soil_table
-from mpm.threads import Threads
+from mpm.threads import Threads, check_threads
 from mpm.time_step import dry_wave_speed, fast_wave_speed
 from mpm.transfer import advance_kernel, update_kernel
 from mpm.variables import (
@@ -93,6 +93,16 @@ class RunFailed(RuntimeError):
         super().__init__(f"{cause} at t = {time:.6g} s, x = {place[0]:.3f} m, y = {place[1]:.3f} m")
 
 
+def cores():
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+
+
+def threads_used(elements, asked=None):
+    """Number of threads that a mesh of so many elements is computed by, of those asked for (None: all cores)."""
+    return 1 if elements < SMALLEST_PARALLEL else max(1, min(asked or cores(), PARTS))
+
+
 class Solver(Measures):
     """Two-phase MPM on a body-fitted triangle mesh; linings are held or move (`mpm.wall`).
 
@@ -106,6 +116,7 @@ class Solver(Measures):
     """
 
     def __init__(self, scene, mesh, threads=None):
+        check_threads(threads)
         if scene.is_half:
             mesh = right_half(mesh)
         self.copies = 2 if scene.is_half else 1  # of what is computed, in the whole
@@ -142,8 +153,7 @@ class Solver(Measures):
         self.status = np.zeros(n, np.int8)
         self.contents = np.zeros((m, ELEMENT_CONTENTS))
         self.clock = Clock.of(self.levels, float(scene.numerics.stress_damping))
-        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
-        self.threads = 1 if m < SMALLEST_PARALLEL else max(1, min(threads or cores, PARTS))
+        self.threads = threads_used(m, threads)
         self.workers = Threads(self.threads, PARTS + 1)
         self.clamps = np.zeros((PARTS, len(CLAMPS)), np.int64)
         self.ledger = np.zeros((PARTS, len(LEDGER)))
@@ -317,10 +327,13 @@ class Solver(Measures):
         return steps, residual
 
     def open_gate(self):
-        """Take the plug away: the opening is free, its corners stand still or belong to the channel walls."""
+        """Take the plug away: the opening is free, its corners stand still or belong to the channel walls.
+
+        Without a gate in the scene the lining stays whole.
+        """
         self.normal = self._normal_open
         self.active = self._active_open
-        if self.scene.gate.corners == "held":
+        if self.scene.gate is not None and self.scene.gate.corners == "held":
             self.fixed[self.mesh.corner_nodes] |= FIXED_X | FIXED_Y
         self.gate_open = True
 

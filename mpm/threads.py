@@ -1,10 +1,24 @@
 """The threads of a solver: idle between uses, and never more of them at work than asked for."""
 
+import numbers
 from concurrent.futures import ThreadPoolExecutor, wait
 
 import numpy as np
 
 from mpm.meeting import meeting_width, stage_at_hand
+
+
+def check_threads(threads):
+    """Refuse what is no number of threads; None stands for all cores.
+
+    Raises
+    ------
+    ValueError
+    """
+    if threads is None:
+        return
+    if isinstance(threads, bool) or not isinstance(threads, numbers.Integral) or threads < 1:
+        raise ValueError(f"threads: must be a whole number from 1, got {threads!r}; leave it out (None) for all cores")
 
 
 class Threads:

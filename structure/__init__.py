@@ -4,10 +4,28 @@ Names load on first use, so that ``import structure`` itself costs nothing.
 """
 
 from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from structure.beam_spring import BeamSpringLining
+    from structure.checks import CapacityRule, Limits, check
+    from structure.continuum import ContinuumLining
+    from structure.continuum_bolts import Bolts
+    from structure.continuum_mesh import GasketGroove, Gate
+    from structure.inputs import GushingWarning, InputError
+    from structure.lining import LiningFailure, LiningModel, additional
+    from structure.models import lining_model, lining_model_names, register_lining_model
+    from structure.ring import Ground, Ring
+    from structure.sections import SegmentSection
+    from structure.theory import theoretical_pressures
+
+    __version__: str
 
 _HOMES = {
     "Ring": "structure.ring",
     "Ground": "structure.ring",
+    "GushingWarning": "structure.inputs",
+    "InputError": "structure.inputs",
     "LiningModel": "structure.lining",
     "LiningFailure": "structure.lining",
     "additional": "structure.lining",
@@ -17,7 +35,7 @@ _HOMES = {
     "SegmentSection": "structure.sections",
     "BeamSpringLining": "structure.beam_spring",
     "ContinuumLining": "structure.continuum",
-    "Opening": "structure.continuum_mesh",
+    "Gate": "structure.continuum_mesh",
     "GasketGroove": "structure.continuum_mesh",
     "Bolts": "structure.continuum_bolts",
     "lining_model": "structure.models",
@@ -26,14 +44,39 @@ _HOMES = {
     "theoretical_pressures": "structure.theory",
 }
 
-__all__ = sorted(_HOMES)
+__all__ = [
+    "BeamSpringLining",
+    "Bolts",
+    "CapacityRule",
+    "ContinuumLining",
+    "GasketGroove",
+    "Ground",
+    "GushingWarning",
+    "InputError",
+    "Limits",
+    "LiningFailure",
+    "LiningModel",
+    "Gate",
+    "Ring",
+    "SegmentSection",
+    "additional",
+    "check",
+    "lining_model",
+    "lining_model_names",
+    "register_lining_model",
+    "theoretical_pressures",
+]
 
 
-def __getattr__(name):
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("gushing")
     if name in _HOMES:
         return getattr(import_module(_HOMES[name]), name)
     raise AttributeError(f"module 'structure' has no attribute {name!r}")
 
 
-def __dir__():
-    return sorted({*globals(), *_HOMES})
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOMES, "__version__"})

@@ -239,5 +239,5 @@ class BeamSpringLining(LiningModel):
         response = response_dataset(fields, coordinates, attributes)
         response["time"].attrs |= pressures["time"].attrs
         if "inflow_mass" in pressures:
-            response["inflow_mass"] = pressures["inflow_mass"]
+            response = response.assign_coords(inflow_mass=pressures["inflow_mass"])
         return response

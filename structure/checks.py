@@ -9,8 +9,9 @@ from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, ValidationError, model_validator
 
+from structure.inputs import Input, InputError, mistakes, refusal
 from structure.sections import SegmentSection, interaction, moment_utilisation, radial_utilisation
 
 #: name: what it is, for figures and tables.
@@ -22,7 +23,7 @@ UTILISATIONS = {
 }
 
 
-class CapacityRule(BaseModel):
+class CapacityRule(Input):
     """How internal forces are set against the capacity of the section; every value is the user's.
 
     Parameters
@@ -36,15 +37,13 @@ class CapacityRule(BaseModel):
         "constant_axial_force": |M_Ed| over the moment carried at the same N_Ed; infinite beyond the largest N.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
     axial_force_factor: float = Field(gt=0)
     moment_factor: float = Field(gt=0)
     minimum_eccentricity: float = Field(ge=0)
     utilisation: Literal["radial", "constant_axial_force"]
 
 
-class Limits(BaseModel):
+class Limits(Input):
     """Limits of a lining; those left out are not checked, none has a default value.
 
     Parameters
@@ -62,8 +61,6 @@ class Limits(BaseModel):
     convergence_per_mille : float, optional
         Largest change of the horizontal or vertical diameter over the outer diameter [per mille].
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     segment: SegmentSection | None = None
     capacity: CapacityRule | None = None
@@ -84,8 +81,24 @@ class Limits(BaseModel):
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Limits:
-        """Limits from a TOML file with the keys above, tables ``[segment]`` and ``[capacity]``; SI units."""
-        return cls.model_validate(tomllib.loads(Path(path).read_text(encoding="utf-8-sig")))
+        """Limits from a TOML file with the keys above, tables ``[segment]`` and ``[capacity]``; SI units.
+
+        Raises
+        ------
+        structure.InputError
+            No TOML, or no limits: every mistake with key, rule, value and remedy.
+        OSError
+            Not readable.
+        """
+        who = f"limits '{path}'"
+        try:
+            data = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
+            raise InputError(f"{who}: must be valid TOML, got: {problem}; correct it there") from None
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            raise InputError(refusal(who, mistakes(error, cls))) from None
 
 
 def check(response: xr.Dataset, limits: Limits) -> xr.Dataset:
@@ -146,11 +159,11 @@ def _capacity_check(response, limits, thickness):
     share = axial.copy(data=measure(boundary, axial.values, moment.values))
     closed = [np.append(values, values[0]) for values in boundary]
     return {
-        "design_axial_force": _described(axial, "N m-1", "design axial force, compression positive"),
-        "design_bending_moment": _described(moment, "N m m-1", "design bending moment, tension outside positive"),
+        "design_axial_force": _described(axial, "N/m", "design axial force, compression positive"),
+        "design_bending_moment": _described(moment, "N m/m", "design bending moment, tension outside positive"),
         "section_utilisation": _described(share, "1", f"utilisation of the segments in N and M, {rule.utilisation}"),
-        "capacity_axial_force": ("capacity_point", closed[0], _meaning("N m-1", "axial force at capacity")),
-        "capacity_bending_moment": ("capacity_point", closed[1], _meaning("N m m-1", "bending moment at capacity")),
+        "capacity_axial_force": ("capacity_point", closed[0], _meaning("N/m", "axial force at capacity")),
+        "capacity_bending_moment": ("capacity_point", closed[1], _meaning("N m/m", "bending moment at capacity")),
     }
 
 
@@ -179,7 +192,7 @@ def _convergence_check(response, limit, diameter):
     larger = np.maximum(np.abs(response["convergence_horizontal"]), np.abs(response["convergence_vertical"]))
     return {
         "convergence_per_mille": _described(
-            1e3 * larger / diameter, "1e-3", "larger change of the two diameters over the outer diameter"
+            1e3 * larger / diameter, "mm/m", "larger change of the two diameters over the outer diameter"
         ),
         "convergence_utilisation": _described(1e3 * larger / diameter / limit, "1", "convergence over its limit"),
     }

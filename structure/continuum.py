@@ -12,7 +12,7 @@ from structure.balance import borne, even_loads, without_unborne
 from structure.continuum_bolts import Bolts, anchor_place, bolt_elongation, bolt_shares, check_bolts, near_anchors
 from structure.continuum_equilibrium import SpringEquilibrium
 from structure.continuum_face import spring_feelers, traction_operator
-from structure.continuum_mesh import EDGE_MEAN, ContinuumMesh, GasketGroove, Opening
+from structure.continuum_mesh import EDGE_MEAN, ContinuumMesh, GasketGroove, Gate
 from structure.continuum_sections import section_displacements, section_forces
 from structure.continuum_stiffness import Concrete, joint_operators, joint_stiffness, nodes_from_unknowns
 from structure.equilibrium import NoEquilibrium
@@ -27,7 +27,7 @@ STRESSES = {
     "stress_rt": ("Pa", "shear stress in the lining, positive where it turns a radius clockwise outside"),
 }
 #: Units and long name of the one variable beyond the schema of all models.
-BOLT_FORCE = {"units": "N m-1", "long_name": "force in the bolts of a joint per metre of tunnel, tension positive"}
+BOLT_FORCE = {"units": "N/m", "long_name": "force in the bolts of a joint per metre of tunnel, tension positive"}
 
 
 class ContinuumLining(LiningModel):
@@ -48,7 +48,7 @@ class ContinuumLining(LiningModel):
         material, which can match rotation and shear only; its normal stiffness is 12 k_theta/t^2.
     strip_width : float
         Of the equivalent strip [m].
-    opening : Opening or tuple of float, optional
+    gate : Gate or tuple of float, optional
         Angle [degree], width [m] and cut share of the open gate. In a slot (cut = 1, the default) there is no lining;
         N, Q, M and displacements there are NaN.
     groove : GasketGroove or tuple of float, optional
@@ -74,24 +74,24 @@ class ContinuumLining(LiningModel):
         layers: int = 2,
         joint: Literal["zero_thickness", "equivalent_strip"] = "zero_thickness",
         strip_width: float = 0.02,
-        opening: Opening | tuple[float, float] | None = None,
+        gate: Gate | tuple[float, float] | None = None,
         groove: GasketGroove | tuple[float, float, float] | None = None,
         bolts: Bolts | tuple[float, float, float] | None = None,
     ):
-        opening = None if opening is None else Opening(*opening)
+        gate = None if gate is None else Gate(*gate)
         groove = None if groove is None else GasketGroove(*groove)
         bolts = None if bolts is None else Bolts(*bolts)
         _refuse_unsupported(ring)
-        _refuse_options(ring, columns, layers, joint, strip_width, opening)
+        _refuse_options(ring, columns, layers, joint, strip_width, gate)
         if groove is not None:
             _check_groove(ring, joint, groove)
         if bolts is not None:
             check_bolts(ring, bolts)
-        self.ring, self.joint, self.opening, self.groove, self.bolts = ring, joint, opening, groove, bolts
+        self.ring, self.joint, self.gate, self.groove, self.bolts = ring, joint, gate, groove, bolts
         width = strip_width if joint == "equivalent_strip" else 0.0
         # A strip's faces stand apart, so its anchors meet no line offset from them.
         anchor = anchor_place(ring, bolts)[0] if bolts is not None and width == 0 else None
-        self.mesh = ContinuumMesh(ring, columns, layers, width, opening, groove, anchor)
+        self.mesh = ContinuumMesh(ring, columns, layers, width, gate, groove, anchor)
         self._theta = np.radians(THETA)
         self._sides = [(self._theta + side) % (2 * np.pi) for side in SIDES]
         self._solid = np.all([self.mesh.locate(side)[0] >= 0 for side in self._sides], axis=0)
@@ -339,13 +339,13 @@ class ContinuumLining(LiningModel):
         return share.ravel() / span.sum()
 
     def _quarter_sides(self):
-        """Radial displacement at crown, right, invert, left: mean of both sides of a joint or of the opening."""
+        """Radial displacement at crown, right, invert, left: mean of both sides of a joint or of the gate."""
         sides = []
         for quarter in np.arange(4) * np.pi / 2:
             off = 1e-6
-            if self.opening is not None and self.opening.cut == 1:
-                distance = abs((quarter - np.radians(self.opening.angle) + np.pi) % (2 * np.pi) - np.pi)
-                half = self.opening.width / 2 / self.ring.centre_radius
+            if self.gate is not None and self.gate.cut == 1:
+                distance = abs((quarter - np.radians(self.gate.angle) + np.pi) % (2 * np.pi) - np.pi)
+                half = self.gate.width / 2 / self.ring.centre_radius
                 off = half + distance if distance < half else off
             sides.append(section_displacements(self.mesh, np.array([quarter - off, quarter + off]) % (2 * np.pi))[0])
         return sides
@@ -385,9 +385,9 @@ class ContinuumLining(LiningModel):
             "mesh": f"{len(self.mesh.column_lines)} columns, {self.mesh.layers} layers of 9-node quadrilaterals",
             "joint_model": self.joint,
         }
-        if self.opening is not None:
-            attributes |= {"opening_angle": float(self.opening.angle), "opening_width": float(self.opening.width)}
-            attributes["opening_cut"] = float(self.opening.cut)
+        if self.gate is not None:
+            attributes |= {"gate_angle": float(self.gate.angle), "gate_width": float(self.gate.width)}
+            attributes["gate_cut"] = float(self.gate.cut)
         for name, detail in (("groove", self.groove), ("bolts", self.bolts)):
             if detail is not None:
                 attributes[name] = ", ".join(f"{part} {value:g}" for part, value in detail._asdict().items())
@@ -408,7 +408,7 @@ class ContinuumLining(LiningModel):
         response = response_dataset(fields, coordinates, attributes)
         response["time"].attrs |= pressures["time"].attrs
         if "inflow_mass" in pressures:
-            response["inflow_mass"] = pressures["inflow_mass"]
+            response = response.assign_coords(inflow_mass=pressures["inflow_mass"])
         return response
 
 
@@ -433,7 +433,7 @@ def _refuse_unsupported(ring: Ring):
             )
 
 
-def _refuse_options(ring, columns, layers, joint, strip_width, opening):
+def _refuse_options(ring, columns, layers, joint, strip_width, gate):
     if joint not in ("zero_thickness", "equivalent_strip"):
         raise ValueError(f"joint must be 'zero_thickness' or 'equivalent_strip', got {joint!r}; choose one")
     if not 12 <= columns <= 20000:
@@ -445,15 +445,15 @@ def _refuse_options(ring, columns, layers, joint, strip_width, opening):
             f"strip_width must be above 0 and below the thickness {ring.thickness:g} m, got {strip_width:g} m;"
             " 0.02 is a usual gap"
         )
-    if opening is not None and not 0 < opening.cut <= 1:
+    if gate is not None and not 0 < gate.cut <= 1:
         raise ValueError(
-            f"opening: cut must be above 0 and at most 1, the share of the tunnel's length that is open, got"
-            f" {opening.cut:g}; 1 is a slot through the ring"
+            f"gate: cut must be above 0 and at most 1, the share of the tunnel's length that is open, got"
+            f" {gate.cut:g}; 1 is a slot through the ring"
         )
-    if opening is not None and not 0 < opening.width < ring.inner_diameter / 4:
+    if gate is not None and not 0 < gate.width < ring.inner_diameter / 4:
         raise ValueError(
-            f"opening: width must be above 0 and below a quarter of the inner diameter"
-            f" ({ring.inner_diameter / 4:g} m), got {opening.width:g} m; the gate of the built-in scenes is 0.2 m wide"
+            f"gate: width must be above 0 and below a quarter of the inner diameter"
+            f" ({ring.inner_diameter / 4:g} m), got {gate.width:g} m; that of the built-in scenes is 0.2 m wide"
         )
 
 

@@ -72,7 +72,7 @@ def bolt_elongation(ring: Ring, mesh: ContinuumMesh, bolts: Bolts) -> sparse.csr
         if (column < 0).any():
             raise ValueError(
                 f"bolts: anchors must lie in concrete, got one of joint {int(np.argmax(column < 0)) + 1} in the open"
-                " gate; shorten the bolts or move the opening"
+                " gate; shorten the bolts or move the gate"
             )
         weights = edge_shapes(place)[:, :, None] * across
         lines = mesh.column_lines[column]

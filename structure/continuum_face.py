@@ -22,7 +22,7 @@ def traction_operator(ring: Ring, mesh: ContinuumMesh, theta: np.ndarray) -> tup
     Returns
     -------
     pressure, shear : (n_unknowns, n_theta) sparse
-        Forces [N/m] per Pa, traction linear between the samples. No force on the opening, and a hole's
+        Forces [N/m] per Pa, traction linear between the samples. No force on the gate, and a hole's
         share of it is left out.
     """
     edges = mesh.column_angles()

@@ -21,7 +21,7 @@ BRIDGE_COLUMNS = 4
 EDGE_MEAN = np.array([1, 4, 1]) / 6
 
 
-class Opening(NamedTuple):
+class Gate(NamedTuple):
     """A slot with radial walls through the lining, or a hole spread evenly over the tunnel's length.
 
     angle : of its middle [degree, clockwise];  width : on the centre line [m];
@@ -66,7 +66,7 @@ class ContinuumMesh:
         Elements across the thickness.
     strip_width : float
         [m]; 0 for zero-thickness joints, else each joint is a column of this width.
-    opening : Opening or None
+    gate : Gate or None
     groove : GasketGroove or None
         Its edges become lines of the mesh, with at least `layers` elements across the thickness.
     anchor_angle : float or None
@@ -97,7 +97,7 @@ class ContinuumMesh:
     Raises
     ------
     ValueError
-        Bodies without room for concrete: joints or opening too close to each other.
+        Bodies without room for concrete: joints or gate too close to each other.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class ContinuumMesh:
         columns: int,
         layers: int,
         strip_width: float = 0.0,
-        opening: Opening | None = None,
+        gate: Gate | None = None,
         groove: GasketGroove | None = None,
         anchor_angle: float | None = None,
     ):
@@ -120,8 +120,8 @@ class ContinuumMesh:
         self._centre_radius = ring.centre_radius
         self._groove_span = 0.0 if groove is None else groove.depth / ring.centre_radius
         self._line_offsets = [offset for offset in (self._groove_span, anchor_angle) if offset]
-        boundaries = self._boundaries(ring, strip_width, opening)
-        bridge = 0.0 if opening is None else 1 - opening.cut
+        boundaries = self._boundaries(ring, strip_width, gate)
+        bridge = 0.0 if gate is None else 1 - gate.cut
         angles, column_lines, strips, shares, before, after, grooved = [], [], [], [], [], [], []
         closed = not boundaries
         for index, (start, end) in enumerate(self._bodies(boundaries)):
@@ -178,10 +178,10 @@ class ContinuumMesh:
         return np.concatenate(parts)
 
     @staticmethod
-    def _boundaries(ring: Ring, strip_width: float, opening: Opening | None) -> list[Boundary]:
+    def _boundaries(ring: Ring, strip_width: float, gate: Gate | None) -> list[Boundary]:
         boundaries = [Boundary(np.radians(angle), strip_width, True) for angle in ring.joint_angles]
-        if opening is not None:
-            boundaries.append(Boundary(np.radians(opening.angle % 360), opening.width, False))
+        if gate is not None:
+            boundaries.append(Boundary(np.radians(gate.angle % 360), gate.width, False))
         return sorted(boundaries)
 
     def _bodies(self, boundaries: list[Boundary]) -> list[tuple[float, float]]:
@@ -196,9 +196,9 @@ class ContinuumMesh:
             end = following.angle + turn - following.width / 2 / self._centre_radius
             if end - start < np.radians(0.5):
                 raise ValueError(
-                    f"ring: joints and opening must leave at least 0.5 degrees of concrete between them, got"
+                    f"ring: joints and gate must leave at least 0.5 degrees of concrete between them, got"
                     f" {np.degrees(end - start):.3g} degrees after {np.degrees(boundary.angle):g} degrees;"
-                    " move the opening, or make it or the joint strip narrower"
+                    " move the gate, or make it or the joint strip narrower"
                 )
             bodies.append((start, end))
         return bodies
@@ -238,7 +238,7 @@ class ContinuumMesh:
     def locate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Column of each angle [rad], and the place in it from 0 to 1.
 
-        Columns are -1 in the opening. On a zero-thickness joint one of its sides is taken.
+        Columns are -1 in the gate. On a zero-thickness joint one of its sides is taken.
         """
         edges = self.column_angles()
         begin, span = edges[:, 0], edges[:, 2] - edges[:, 0]

@@ -21,7 +21,7 @@ _BUILT_IN = {
 _REGISTERED: dict[str, type[LiningModel]] = {}
 
 
-def register_lining_model(name: str, model: type[LiningModel]):
+def register_lining_model(name: str, model: type[LiningModel]) -> None:
     """Make a model known by name in this process; its constructor takes a :class:`structure.ring.Ring`.
 
     Raises

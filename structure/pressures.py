@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from structure.inputs import GushingWarning
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -188,7 +190,7 @@ def _warn_of_size(found, ring):
         told = f"soil and water are up to {largest:.3g} Pa, beyond any tunnel's ({most:.1g} Pa); check their units"
     else:
         return
-    warnings.warn(f"pressures: {told}", stacklevel=3)
+    warnings.warn(f"pressures: {told}", GushingWarning, stacklevel=3)
 
 
 @cache

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
+
+from structure.inputs import Input
+from structure.plausibility import GROUND, RING, Usual, joints_in_radians
 
 
-class Ground(BaseModel):
+class Ground(Input):
     """Soil around the ring, as the soil springs see it.
 
     Parameters
@@ -37,7 +40,7 @@ class Ground(BaseModel):
         Whether normal springs also pull. Off by default: a two-way spring pulls a shrinking ring outward.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    usual: ClassVar[Usual] = GROUND
 
     youngs_modulus: float = Field(gt=0)
     poissons_ratio: float = Field(ge=0, lt=0.5)
@@ -53,7 +56,7 @@ class Ground(BaseModel):
     two_way: bool = False
 
 
-class Ring(BaseModel):
+class Ring(Input):
     """A ring of segments, one metre of tunnel.
 
     Parameters
@@ -97,7 +100,7 @@ class Ring(BaseModel):
         With or without shear deformation.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    usual: ClassVar[Usual] = RING
 
     outer_diameter: float = Field(gt=0)
     inner_diameter: float = Field(gt=0)
@@ -141,6 +144,11 @@ class Ring(BaseModel):
         if self.support == "invert" and self.ground is not None:
             raise ValueError("support must be 'free' where there is ground, got 'invert'; remove one of the two")
         return self
+
+    def unusual(self) -> dict[str, str]:
+        """As of every input, and joint angles in radians."""
+        radians = joints_in_radians(self.joint_angles)
+        return super().unusual() | ({"joint_angles": radians} if radians else {})
 
     def _check_joint_laws(self):
         height = self.joint_contact_height

@@ -9,13 +9,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
+
+from structure.inputs import Input
 
 #: Gauss points over each part of the section with a smooth stress; the parabola needs two, other exponents a few.
 GAUSS_POINTS = 12
 
 
-class SegmentSection(BaseModel):
+class SegmentSection(Input):
     """Concrete and steel of a segment; every value is the user's, none has a default.
 
     Parameters
@@ -39,8 +41,6 @@ class SegmentSection(BaseModel):
 
     Source: EN 1992-1-1:2004, 3.1.7, 3.2.7, 6.1.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     concrete_strength: float = Field(gt=0)
     concrete_long_term_factor: float = Field(gt=0, le=1)

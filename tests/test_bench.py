@@ -53,7 +53,8 @@ def test_configurations_differ_in_what_they_leave_out():
     scenes = dict(configurations(whole))
     assert scenes["dry, elastic"].water is None
     assert {soil.model for soil in scenes["two-phase, elastic"].soils} == {"elastic"}
-    assert not scenes["two-phase, Mohr-Coulomb, no smoothing"].numerics.volumetric_smoothing
+    undamped = scenes["two-phase, Mohr-Coulomb, no filter or damping"].numerics
+    assert undamped.pressure_filter == undamped.stress_damping == 0
     assert scenes["two-phase, Mohr-Coulomb"] == whole
     assert len({str(scene) for scene in scenes.values()}) == len(scenes)
 

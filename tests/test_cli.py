@@ -15,9 +15,10 @@ from typer.testing import CliRunner
 import coupling
 import mpm
 from coupling import datasets
-from coupling.cli import ProgressLine, app
+from coupling.cli import app
 from coupling.figures import draw_run
 from coupling.plan import features
+from coupling.progress_line import ProgressLine
 from coupling.run import check_memory, run
 from coupling.run_folder import RunRefused, claimed, default_folder
 

@@ -160,7 +160,7 @@ def test_ring_that_only_bolts_hold_is_refused_with_that_reason():
         (dict(bolts=(0.1, 2.5, 2e8)), {}, "shorten it or move it inward"),
         (dict(bolts=(0.0, 0.4, 0.0)), {}, "stiffness must be above 0"),
         (dict(bolts=BOLTS), dict(joint_angles=()), "must have joints"),
-        (dict(bolts=BOLTS, opening=(76.5, 0.2)), {}, "open gate"),
+        (dict(bolts=BOLTS, gate=(76.5, 0.2)), {}, "open gate"),
     ],
 )
 def test_details_that_mean_nothing_are_refused(options, changes, message):

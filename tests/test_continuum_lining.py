@@ -280,9 +280,9 @@ def test_extremes_beyond_the_ring_are_refused_with_the_reason(model, case):
         (dict(columns=4), {}, "columns must lie in 12"),
         (dict(layers=0), {}, "layers must lie in 1"),
         (dict(joint="equivalent_strip", strip_width=1.0), {}, "strip_width must be above 0"),
-        (dict(opening=(90.0, 3.0)), {}, "opening: width"),
-        (dict(opening=(90.0, 0.2, 1.5)), {}, "opening: cut"),
-        (dict(opening=(73.0, 0.2)), {}, "0.5 degrees of concrete"),
+        (dict(gate=(90.0, 3.0)), {}, "gate: width"),
+        (dict(gate=(90.0, 0.2, 1.5)), {}, "gate: cut"),
+        (dict(gate=(73.0, 0.2)), {}, "0.5 degrees of concrete"),
     ],
 )
 def test_options_that_mean_nothing_are_refused(options, changes, message):
@@ -292,7 +292,7 @@ def test_options_that_mean_nothing_are_refused(options, changes, message):
 
 def test_vanishing_hole_leaves_the_ring_whole():
     whole = ContinuumLining(ring()).respond(pressures()).isel(time=0)
-    hole = ContinuumLining(ring(), opening=(90.0, 0.2, 1e-9)).respond(pressures()).isel(time=0)
+    hole = ContinuumLining(ring(), gate=(90.0, 0.2, 1e-9)).respond(pressures()).isel(time=0)
     for name in ("axial_force", "shear_force", "bending_moment", "displacement_radial"):
         # 1e-3 of the largest: other elements around the hole.
         assert largest(hole[name] - whole[name]) < 1e-3 * largest(whole[name])
@@ -302,7 +302,7 @@ def test_hole_weakens_the_ring_in_proportion_to_its_length():
     whole = ContinuumLining(ring()).respond(pressures()).isel(time=0)
     changes = []
     for cut in (0.02, 0.04):
-        hole = ContinuumLining(ring(), opening=(90.0, 0.2, cut)).respond(pressures()).isel(time=0)
+        hole = ContinuumLining(ring(), gate=(90.0, 0.2, cut)).respond(pressures()).isel(time=0)
         changes.append(largest(hole["bending_moment"] - whole["bending_moment"]))
     # 5 %: to first order the change is proportional to what is missing.
     assert changes[1] == pytest.approx(2 * changes[0], rel=0.05)
@@ -310,12 +310,12 @@ def test_hole_weakens_the_ring_in_proportion_to_its_length():
 
 def test_slot_cuts_the_ring_and_weak_ground_cannot_hold_it():
     with pytest.raises(LiningFailure, match="ground cannot carry"):
-        ContinuumLining(ring(), opening=(90.0, 0.2)).respond(pressures())
+        ContinuumLining(ring(), gate=(90.0, 0.2)).respond(pressures())
 
 
 def test_slot_faces_are_free():
     open_ring = ring(joint_angles=(), ground=ground(two_way=True, law="linear"))
-    response = ContinuumLining(open_ring, opening=(90.0, 0.2)).respond(pressures(0.1)).isel(time=0)
+    response = ContinuumLining(open_ring, gate=(90.0, 0.2)).respond(pressures(0.1)).isel(time=0)
     hole = np.abs(response["theta"] - 90) < np.degrees(0.1 / 3.125)
     np.testing.assert_array_equal(np.isnan(response["axial_force"].values), hole.values)
     beside = response.sel(theta=[87, 93])

@@ -20,6 +20,7 @@ from coupling.run import respond
 from coupling.run_folder import claimed
 
 TIMES = (0.0, 0.5, 1.0)
+STEMS = ("points", "mesh", "lining", "ring_beam_spring")
 
 
 class Square(TwoTriangles):
@@ -60,11 +61,21 @@ def same_points(grid, shot):
     (block,) = grid.cells
     assert block.type == "vertex"
     np.testing.assert_array_equal(block.data.ravel(), np.arange(here.sum()))
-    for name in ("pore_pressure", "porosity", "deviatoric_strain", "stress_yy", "soil"):
+    for name in ("pore_pressure", "porosity", "deviatoric_strain", "soil"):
         np.testing.assert_array_equal(grid.point_data[name].ravel(), shot[name].values[here])
+    stress = {part: shot[f"stress_{part}"].values[here] for part in ("xx", "yy", "zz", "xy")}
+    same_tensor(grid.point_data["stress"], stress)
     for name in ("displacement", "velocity_solid", "velocity_liquid"):
         for k, axis in enumerate("xy"):
             np.testing.assert_array_equal(grid.point_data[name][:, k], shot[f"{name}_{axis}"].values[here])
+
+
+def same_tensor(tensor, parts, **tolerance):
+    """Whether nine numbers a place are the symmetric tensor of these parts, with no shear out of the plane."""
+    full = tensor.reshape(-1, 3, 3)
+    for (i, j), part in {(0, 0): "xx", (1, 1): "yy", (2, 2): "zz", (0, 1): "xy", (1, 0): "xy"}.items():
+        np.testing.assert_allclose(full[:, i, j], parts[part], **{"rtol": 0, **tolerance})
+    assert not full[:, [0, 1, 2, 2], [2, 2, 0, 1]].any()
 
 
 def same_mesh(grid, shot):
@@ -79,32 +90,67 @@ def same_mesh(grid, shot):
     for element, inside in enumerate((y + 20 < x, y + 20 > x)):
         assert inside.any()
         assert grid.cell_data["filled"][0][element] == pytest.approx(volume[inside].sum() / 800.0, rel=1e-6)
-        for name in ("pore_pressure", "stress_yy"):
-            mean = np.average(shot[name].values[here][inside], weights=volume[inside])
-            # stored as float32
-            assert grid.cell_data[name][0][element] == pytest.approx(mean, rel=1e-6)
+
+        def mean(name, inside=inside):
+            return np.average(shot[name].values[here][inside], weights=volume[inside])
+
+        # stored as float32
+        assert grid.cell_data["pore_pressure"][0][element] == pytest.approx(mean("pore_pressure"), rel=1e-6)
+        parts = {part: mean(f"stress_{part}") for part in ("xx", "yy", "zz", "xy")}
+        same_tensor(grid.cell_data["stress"][0][[element]], parts, rtol=1e-6)
         moved = np.average(shot["displacement_x"].values[here][inside], weights=volume[inside])
         assert grid.cell_data["displacement"][0][element, 0] == pytest.approx(moved, rel=1e-6, abs=1e-12)
     np.testing.assert_array_equal(grid.cell_data["region"][0], Square.region)
+
+
+def same_lining(grid, pressures):
+    """Whether a grid is the ring of the quick scene, its cells at their angles, with the pressures of one time."""
+    (block,) = grid.cells
+    assert block.type == "quad"
+    corners = grid.points[block.data][:, :, :2] - [0.0, -23.3]
+    radius = np.hypot(corners[..., 0], corners[..., 1])
+    np.testing.assert_allclose(radius, np.broadcast_to([3.3, 3.3, 2.95, 2.95], radius.shape))
+    middle = corners.sum(axis=1)
+    angle = np.degrees(np.arctan2(middle[:, 0], middle[:, 1])) % 360
+    apart = (angle - pressures["theta"].values + 180) % 360 - 180
+    np.testing.assert_allclose(apart, 0.0, atol=0.5 * 360 / len(angle))
+    for name in pressures.data_vars:
+        if pressures[name].dims == ("theta",) and not name.startswith("displacement"):
+            np.testing.assert_array_equal(grid.cell_data[name][0].ravel(), pressures[name].values)
+    assert not grid.cell_data["tunnel"][0].any()
+
+
+def same_ring(grid, response):
+    """The same of the forces; the displacement is the radial and tangential one, in the directions of the ground."""
+    same_lining(grid, response)
+    moved, angle = grid.cell_data["displacement"][0], np.radians(response["theta"].values)
+    outward = moved[:, 0] * np.sin(angle) + moved[:, 1] * np.cos(angle)
+    clockwise = moved[:, 0] * np.cos(angle) - moved[:, 1] * np.sin(angle)
+    np.testing.assert_allclose(outward, response["displacement_radial"].values, atol=1e-15)
+    np.testing.assert_allclose(clockwise, response["displacement_tangential"].values, atol=1e-15)
 
 
 def test_vtu_files_hold_points_and_mesh_of_every_time(folder, tmp_path):
     done = gush("export", folder, "--out", tmp_path, "--json", tmp_path.parent / "files.json")
     assert done.exit_code == 0, done.output
     files = json.loads((tmp_path.parent / "files.json").read_text())["files"]
-    assert files == [str(tmp_path / "points.pvd"), str(tmp_path / "mesh.pvd")]
+    assert files == [str(tmp_path / f"{stem}.pvd") for stem in STEMS]
     points = datasets.read_points(folder)
     assert len({int(np.isfinite(points["x"][k]).sum()) for k in range(3)}) > 1
-    for series, same in zip(files, (same_points, same_mesh), strict=True):
+    pressures, response = datasets.read_pressures(folder), datasets.read_response(folder)
+    compared = ((same_points, points), (same_mesh, points), (same_lining, pressures), (same_ring, response))
+    for series, (same, data) in zip(files, compared, strict=True):
         listed = ET.parse(series).getroot().findall("Collection/DataSet")
         assert [float(entry.get("timestep")) for entry in listed] == list(TIMES)
         for k, entry in enumerate(listed):
-            same(meshio.read(tmp_path / entry.get("file")), points.isel(time=k))
+            same(meshio.read(tmp_path / entry.get("file")), data.isel(time=k))
 
 
 def test_xdmf_series_hold_points_and_mesh_of_every_time(folder, tmp_path):
     files, points = export(folder, "xdmf", tmp_path), datasets.read_points(folder)
-    for path, same in zip(files, (same_points, same_mesh), strict=True):
+    pressures, response = datasets.read_pressures(folder), datasets.read_response(folder)
+    compared = ((same_points, points), (same_mesh, points), (same_lining, pressures), (same_ring, response))
+    for path, (same, data) in zip(files, compared, strict=True):
         series = ET.parse(path).getroot().find("Domain/Grid")
         assert series.get("CollectionType") == "Temporal"
         grids = series.findall("Grid")
@@ -115,7 +161,7 @@ def test_xdmf_series_hold_points_and_mesh_of_every_time(folder, tmp_path):
             alone = ET.Element("Xdmf", Version="3.0")
             ET.SubElement(alone, "Domain").append(grid)
             ET.ElementTree(alone).write(tmp_path / "alone.xdmf")
-            same(meshio.read(tmp_path / "alone.xdmf"), points.isel(time=k))
+            same(meshio.read(tmp_path / "alone.xdmf"), data.isel(time=k))
         (tmp_path / "alone.xdmf").unlink()
 
 

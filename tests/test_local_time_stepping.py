@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from scipy.spatial import Delaunay
 from small_event import COARSE
 
 import coupling
 import mpm
 from coupling.stability.monitor import kinetic_energy
 from coupling.verification.boxes import box_mesh
-from coupling.verification.driven import dry_scene
+from coupling.verification.driven import box_scene
 from mpm.variables import MASS, S_RHO_S, VLX, VLY, VSX, VSY, N, X, Y
 
 GRADED = {**COARSE, "size_growth": 0.3}
@@ -63,7 +62,7 @@ def test_every_level_steps_within_the_limit_of_its_elements(mesh):
 
 def test_elements_of_one_size_are_one_level():
     mesh = box_mesh(np.linspace(-2, 2, 9), np.linspace(-4, 0, 9))
-    solver = mpm.Solver(dry_scene("column", 0.5, 4.0, 4.0, {"model": "elastic"}), mesh)
+    solver = mpm.Solver(box_scene("column", 0.5, 4.0, 4.0, {"model": "elastic"}), mesh)
     assert solver.levels.count == 1 and len(solver.nodes) == len(mesh.nodes)
 
 
@@ -103,23 +102,9 @@ def test_undamped_motion_does_not_grow_across_levels(mesh, wet):
 
 
 def graded_column(coarse, fine, width=1.6, depth=24.0):
-    """A column of coarse squares below and fine ones above half its depth."""
-    grids = [
-        np.meshgrid(np.arange(-width / 2, width / 2 + 1e-9, size), np.arange(low, high + 1e-9, size))
-        for size, low, high in ((coarse, -depth, -depth / 2 - coarse), (fine, -depth / 2, 0.0))
-    ]
-    nodes = np.concatenate([np.column_stack([x.ravel(), y.ravel()]) for x, y in grids])
-    elements = Delaunay(nodes).simplices
-    corner = nodes[elements]
-    u, v = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-    area = 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
-    elements = np.where(area[:, None] < 0, elements[:, ::-1], elements)[np.abs(area) > 1e-6].astype(np.int32)
-    assert np.abs(area).sum() == pytest.approx(width * depth, rel=1e-6)
-    mesh = box_mesh([-width / 2, width / 2], [-depth, 0.0])
-    mesh.nodes, mesh.elements, mesh.region = nodes, elements, np.zeros(len(elements), np.int8)
-    for name, axis, value in (("left", 0, -width / 2), ("right", 0, width / 2), ("bottom", 1, -depth), ("top", 1, 0.0)):
-        setattr(mesh, name, np.flatnonzero(np.abs(nodes[:, axis] - value) < 1e-9).astype(np.int32))
-    return mesh
+    """A column of cells that are as wide as the coarse ones, which are squares, below and flat above half its depth."""
+    low, high = np.arange(-depth, -depth / 2 - 1e-9, coarse), np.arange(-depth / 2, 1e-9, fine)
+    return box_mesh(np.arange(-width / 2, width / 2 + 1e-9, coarse), np.concatenate([low, high]))
 
 
 def pulse_error(local, courant=0.8, coarse=0.4, fine=0.1):
@@ -128,8 +113,8 @@ def pulse_error(local, courant=0.8, coarse=0.4, fine=0.1):
     Norm: root mean square over that of the exact answer, d'Alembert: v(y, t) = (f(y - c t) + f(y + c t)) / 2 with
     images at the free surface (same sign) and at the fixed bottom (opposite sign).
     """
-    scene = dry_scene("pulse", 0.4, 1.6, 24.0, {"model": "elastic"}, gravity=1e-9, courant=courant, pic_rate=0.0,
-                      local_time_stepping=local, volumetric_smoothing=False)  # fmt: skip
+    scene = box_scene("pulse", 0.4, 1.6, 24.0, {"model": "elastic"}, gravity=1e-9, courant=courant, pic_rate=0.0,
+                      local_time_stepping=local)  # fmt: skip
     solver = mpm.Solver(scene, graded_column(coarse, fine), threads=1)
     assert (solver.levels.count > 1) == local
     speed, start, length = solver.wave_speed, -15.0, 2.5

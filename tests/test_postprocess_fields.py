@@ -108,7 +108,7 @@ def test_steady_growth_has_no_stages():
 def test_extremes_say_where_they_are():
     theta = np.arange(0.0, 360.0)
     moment = np.stack([np.cos(np.radians(theta - 90)), 2 * np.cos(np.radians(theta - 30))])
-    data = xr.Dataset({"bending_moment": (("time", "theta"), moment, {"units": "N m m-1"})},
+    data = xr.Dataset({"bending_moment": (("time", "theta"), moment, {"units": "N m/m"})},
                       coords={"time": [0.0, 1.0], "theta": theta})  # fmt: skip
     found = postprocess.extremes(data, ["bending_moment"])
     assert found["bending_moment_max_angle"].values.tolist() == [90.0, 30.0]

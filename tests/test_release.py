@@ -1,10 +1,14 @@
 """One version, one licence, wherever they are stated; scripts/check_release.sh checks what a release holds."""
 
+import os
 import re
+import shutil
+import subprocess
 import tomllib
 from importlib.metadata import version
 from pathlib import Path
 
+import pytest
 from typer.testing import CliRunner
 
 from coupling.cli import app
@@ -35,3 +39,19 @@ def test_citation_file_names_the_study_that_is_reproduced():
 
 def test_every_dependency_has_a_lower_bound():
     assert all(">=" in dependency for dependency in PROJECT["dependencies"])
+
+
+def test_one_command_leaves_out_what_only_developers_need():
+    """`./gush` syncs what runs, some 650 MB; the groups of development would make it more than a gigabyte."""
+    (command,) = (line for line in (ROOT / "gush").read_text(encoding="utf-8").splitlines() if "uv run" in line)
+    assert "--no-dev" in command and "--locked" in command
+    uv = os.environ.get("UV") or shutil.which("uv")  # `uv run` tells its own place
+    if uv is None:
+        pytest.skip("no uv on this machine")
+    exported = subprocess.run(
+        [uv, "export", "--locked", "--no-dev", "--no-hashes", "--no-header", "--no-emit-project"],
+        capture_output=True, text=True, cwd=ROOT, check=True,
+    ).stdout  # fmt: skip
+    runs = {re.split(r"[=\s]", line)[0].lower() for line in exported.splitlines() if line and line[0].isalpha()}
+    tools = {"pytest", "hypothesis", "ruff", "mypy", "mkdocs", "compliance-checker", "jedi", "ipykernel", "openseespy"}
+    assert {"numba", "xarray", "gmsh"} <= runs and not tools & runs

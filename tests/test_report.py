@@ -91,7 +91,7 @@ def test_warnings_name_what_is_missing_or_off(run, tree, tmp_path):
     short = write_run(tmp_path / "run.nc", times=(0.0, 0.5), models=(), status="interrupted")
     told = " ".join(run_page.collect(short)["warnings"])
     assert "'interrupted'" in told and "No lining model" in told and "Only 2 records" in told
-    datasets.write_response(short, tree["structure/beam-spring"].to_dataset().isel(time=[0]))
+    datasets.write_response(short, tree["structure/beam_spring"].to_dataset().isel(time=[0]))
     assert "beam-spring holds 1 of 2 records" in " ".join(run_page.collect(short)["warnings"])
 
 
@@ -110,13 +110,13 @@ def test_embedded_series_are_the_datasets_values(run, tree):
     for name in series.PRESSURES:
         np.testing.assert_array_equal(unpacked(tunnel[name]), lining[name].values.astype("f4"))
     for model in player["models"]:
-        response = tree[f"structure/{model['name']}"]
+        response = tree[f"structure/{datasets.identifier(model['name'])}"]
         for name, entry in {**model["fields"], **model["joints"], **model["series"]}.items():
             np.testing.assert_array_equal(unpacked(entry), response[name].values.astype("f4"))
 
 
 def test_a_response_that_stops_early_is_missing_afterwards(tree):
-    response = tree["structure/beam-spring"].to_dataset().isel(time=slice(0, 2))
+    response = tree["structure/beam_spring"].to_dataset().isel(time=slice(0, 2))
     shown = unpacked(series.model_series("beam-spring", response, np.array(TIMES))["fields"]["axial_force"])
     np.testing.assert_array_equal(shown[:2], response["axial_force"].values.astype("f4"))
     assert np.isnan(shown[2:]).all()
@@ -156,7 +156,7 @@ def test_the_page_of_a_long_run_stays_under_ten_megabytes(tree, tmp_path):
     geometry = tree["lining"].attrs
     lining = xr.Dataset({**pressures, **progress}, coords={"time": time, "theta": theta}, attrs=geometry)
     history = xr.Dataset({name: ("time", np.ones(records)) for name in datasets.HISTORY}, coords={"time": time})
-    response = tree["structure/beam-spring"].to_dataset().isel(time=np.zeros(records, int)).assign_coords(time=time)
+    response = tree["structure/beam_spring"].to_dataset().isel(time=np.zeros(records, int)).assign_coords(time=time)
     shot = {name: np.tile(values, 250) for name, values in points(1.0).items() if name != "removed"}
     many = xr.Dataset({name: (("time", "point"), np.stack([values] * 30)) for name, values in shot.items()},
                       coords={"time": np.linspace(0, 100, 30)}, attrs=geometry)  # fmt: skip

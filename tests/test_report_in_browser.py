@@ -55,7 +55,7 @@ def test_key_numbers_in_the_page_are_the_datasets(opened, tree):
         "Object.fromEntries([...document.querySelectorAll('tr[data-key]')].map(r =>"
         " [r.dataset.key, [...r.querySelectorAll('td')].map(c => c.innerText)]))"
     )
-    history, lining, response = tree["history"], tree["lining"], tree["structure/beam-spring"]
+    history, lining, response = tree["history"], tree["lining"], tree["structure/beam_spring"]
     assert number(rows["inflow_mass"][-2]) == written_as(float(history["inflow_mass"][-1]))
     for theta in (0, 180, 270):
         for name in ("soil_pressure", "water_pressure"):
@@ -101,7 +101,7 @@ def test_joint_and_model_tables_show_the_record_of_the_slider(opened, tree, fram
     factors = [1e-3, 1e-3, 1e-3, 1e3, 1e3, 1e3]
     assert len(rows) == 12
     for joint, model, cells in rows:
-        response = tree[f"structure/{model}"]
+        response = tree[datasets.structure_group(model)]
         for (now, start), name, factor in zip(cells, series.JOINT_FIELDS, factors, strict=True):
             values = response[name].values[:, joint] * factor
             assert (number(now), number(start)) == (written_as(values[frame]), written_as(values[0])), name
@@ -110,7 +110,8 @@ def test_joint_and_model_tables_show_the_record_of_the_slider(opened, tree, fram
         ".map(c => c.firstChild.data)"
     )
     beam, other = (
-        tree[f"structure/{m}"]["bending_moment"][frame].max().item() / 1e3 for m in ("beam-spring", "continuum")
+        tree[datasets.structure_group(m)]["bending_moment"][frame].max().item() / 1e3
+        for m in ("beam-spring", "continuum")
     )
     assert [number(c) for c in cells] == [
         written_as(beam),
@@ -127,7 +128,7 @@ def test_unrolled_curves_lie_where_their_axes_say(opened, tree, frame):
         "soil_pressure": [tree["lining"]] * 2,
         "water_pressure": [tree["lining"]] * 2,
         **{
-            name: [tree[f"structure/{model}"] for model in ("beam-spring", "beam-spring", "continuum")]
+            name: [tree[datasets.structure_group(model)] for model in ("beam-spring", "beam-spring", "continuum")]
             for name in ("axial_force", "shear_force", "bending_moment")
         },
     }
@@ -214,7 +215,7 @@ def test_runs_without_ring_or_with_one_record_or_two_tunnels_have_a_page(browser
     browser.complaints.clear()
     one = write_run(tmp_path / "one.nc", times=(0.0,), models=(), status="running")
     browser.open(page.write_report(one, tmp_path / "one.html"))
-    assert "'running'" in browser.evaluate("document.querySelector('.warnings').innerText")
+    assert "'interrupted'" in browser.evaluate("document.querySelector('.warnings').innerText")
     assert browser.evaluate("document.querySelectorAll('#player [data-chart] > svg').length") == 5
     twin = coupling.load_scene("twin-tunnels")
     writer = datasets.RunWriter(tmp_path / "twin.nc", root_attributes(twin), twin.mpm)

@@ -344,7 +344,7 @@ def test_what_cannot_be_resumed_is_refused_with_a_reason(whole, tmp_path):
 def test_finished_run_is_left_as_it_is(whole, tmp_path):
     folder = shutil.copytree(whole, tmp_path / "a")
     before = (folder / "run.nc").read_bytes()
-    assert gush("run", "--resume", "--out", folder, "--no-figures").exit_code == 0
+    assert gush("run", "--resume", "--out", folder, "--no-figures", "--no-response").exit_code == 0
     assert (folder / "run.nc").read_bytes() == before
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 from scipy.optimize import brentq
 
+from structure import InputError
 from structure.sections import (
     SegmentSection,
     interaction,
@@ -177,7 +177,7 @@ def test_table_3_1_at_its_rows():
     ],
 )
 def test_impossible_sections_are_refused(change, message):
-    with pytest.raises(ValidationError, match=message):
+    with pytest.raises(InputError, match=message):
         section(**change)
 
 

@@ -42,7 +42,7 @@ def made_up(source, folder, backends, records, threads):
     mass = np.linspace(0, 100, records)
     result = xr.Dataset(
         {
-            "bending_moment": (("progress",), k0 * angle * mass, {"units": "N m m-1", "long_name": "moment"}),
+            "bending_moment": (("progress",), k0 * angle * mass, {"units": "N m/m", "long_name": "moment"}),
             "time": (("progress",), mass / 100, {"units": "s"}),
             "cpu_seconds": ((), 1.0),
         },

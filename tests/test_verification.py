@@ -7,6 +7,7 @@ import pytest
 from coupling.accuracy.orders import observed_order
 from coupling.verification import problems
 from coupling.verification.exact_plasticity import exact_path, stiffness, yield_planes
+from mpm.scene import Numerics
 
 MINE = list(problems().values())
 
@@ -19,8 +20,11 @@ def test_fast_setting_is_within_its_limit(problem):
 
 @pytest.mark.parametrize("problem", MINE, ids=[p.name for p in MINE])
 def test_settings_of_the_ladder_exist(problem):
-    known = inspect.signature(problem.solve).parameters
-    assert set(problem.fast) | set(problem.ladder) <= set(known)
+    known = inspect.signature(problem.solve).parameters.values()
+    names = {parameter.name for parameter in known}
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in known):  # handed through to the scene
+        names |= {"points", *Numerics.model_fields}
+    assert set(problem.fast) | set(problem.ladder) <= names
     assert all(len(values) > 1 for values in problem.ladder.values())
 
 

@@ -33,7 +33,6 @@ def full_box(**numerics):
     solver = Solver(scene, box_mesh(2.0, 1.0, 0.1, (-1.0, 1.0, -1.0, 0.0)), threads=1)
     solver.points[:, [SXX, SYY, SZZ, SXY]] = 0.0
     solver.points[:, P] = 1e5
-    solver.set_projected_pressure(np.full(len(solver.mesh.nodes), 1e5))
     return solver
 
 

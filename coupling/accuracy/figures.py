@@ -7,9 +7,9 @@ from pathlib import Path
 
 
 def _figure(width, height):
-    from matplotlib.figure import Figure
+    from coupling.picture import Picture
 
-    return Figure(figsize=(width, height), layout="constrained")
+    return Picture(figsize=(width, height), layout="constrained")
 
 
 def problem_figure(title: str, norm: str, rows: list[dict]):

@@ -168,7 +168,7 @@ def ladder_dataset(runs, inflow_masses):
         },
         coords={
             "factor": ("mesh", factor, {"units": "1", "long_name": "mesh size over that of the scene"}),
-            "inflow_mass": ("inflow_mass", np.asarray(inflow_masses, float), {"units": "kg m-1"}),
+            "inflow_mass": ("inflow_mass", np.asarray(inflow_masses, float), {"units": "kg/m"}),
             "quantity": names,
             "unit": ("quantity", units),
         },

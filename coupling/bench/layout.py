@@ -14,7 +14,7 @@ import textwrap
 import numpy as np
 
 PASSES = 2  # over the points
-ELEMENT_PASSES = 3
+ELEMENT_PASSES = 2
 
 
 def bytes_per_point_step(solver):
@@ -23,9 +23,10 @@ def bytes_per_point_step(solver):
     row = solver.points.itemsize * solver.points.shape[1]
     of_points = PASSES * (2 * row + solver.order.itemsize + solver.soil_of_point.itemsize)
     record = solver.geometry[0].nbytes + mesh.elements[0].nbytes + solver.occupied.itemsize + solver.start.itemsize
-    of_elements = ELEMENT_PASSES * record + 2 * solver.volume[0].nbytes
+    # contents are written by one pass, and read by both
+    of_elements = ELEMENT_PASSES * record + 3 * solver.contents[0].nbytes
     # written, read and cleared where a part of the mesh adds to a row; then read by the passes that interpolate
-    row_of_sums = solver.sums[0, 0].nbytes + solver.means[0, 0].nbytes
+    row_of_sums = solver.sums[0, 0].nbytes + solver.momenta[0, 0].nbytes
     of_nodes = 3 * row_of_sums * np.count_nonzero(solver.touched) + (ELEMENT_PASSES + 2) * solver.nodes.nbytes
     return {
         "points": float(of_points),

@@ -21,7 +21,7 @@ def dataset(data):
     def values(rows, key):
         return [row[key] for row in rows]
 
-    rate = {"units": "s-1", "long_name": "point-steps per second of processor time"}
+    rate = {"units": "1/s", "long_name": "point-steps per second of processor time"}
     kernels, configurations, sizes = data["kernels"], data["configurations"], data["sizes"]
     result = xr.Dataset(
         {
@@ -45,12 +45,12 @@ def dataset(data):
 def figure(data):
     """Rates of the configurations and sizes beside the reference loop and the roofline: matplotlib Figure."""
     import matplotlib
-    from matplotlib.figure import Figure
 
     from coupling.figures import GATE, NOW, STYLE
+    from coupling.picture import Picture
 
     with matplotlib.rc_context(STYLE):
-        drawn = Figure(figsize=(7.2, 5.6), layout="constrained")
+        drawn = Picture(figsize=(7.2, 5.6), layout="constrained")
         axes = drawn.subplots(2, 2)
         rows = data["configurations"]
         axes[0, 0].barh([r["configuration"] for r in rows], [r["points_per_second"] / 1e6 for r in rows], color=NOW)

@@ -17,15 +17,14 @@ def configurations(scene):
     def numerics(**changes):
         return scene.numerics.model_copy(update=changes)
 
-    rough = {"volumetric_smoothing": False}
+    undamped = {"pressure_filter": 0.0, "stress_damping": 0.0}
     yield "two-phase, Mohr-Coulomb", scene
-    yield "two-phase, Mohr-Coulomb, no smoothing", scene.model_copy(update={"numerics": numerics(**rough)})
+    yield "two-phase, Mohr-Coulomb, no filter or damping", scene.model_copy(update={"numerics": numerics(**undamped)})
     yield "two-phase, elastic", scene.model_copy(update={"soils": elastic})
     yield "dry, Mohr-Coulomb", scene.model_copy(update={"water": None})
     yield "dry, elastic", scene.model_copy(update={"water": None, "soils": elastic})
-    if hasattr(scene.numerics, "local_time_stepping"):
-        one = {"local_time_stepping": False}
-        yield "two-phase, Mohr-Coulomb, one time step", scene.model_copy(update={"numerics": numerics(**one)})
+    one = {"local_time_stepping": False}
+    yield "two-phase, Mohr-Coulomb, one time step", scene.model_copy(update={"numerics": numerics(**one)})
 
 
 def prepared(mpm_scene, mesh, threads=1):

@@ -19,6 +19,7 @@ from coupling.postprocess.heap import filled, heap
 from coupling.postprocess.inflow import (
     additional_at_inflow,
     at_inflow,
+    by_inflow,
     inflow_linearity,
     pressure_ratio,
     ratio_to_initial,
@@ -32,6 +33,7 @@ __all__ = [
     "additional_at_inflow",
     "arch",
     "at_inflow",
+    "by_inflow",
     "element_areas",
     "element_centres",
     "element_fields",

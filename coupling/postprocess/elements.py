@@ -1,11 +1,21 @@
 """Points of a snapshot averaged in the elements of the mesh, and how much neighbouring elements differ."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from coupling.postprocess.geometry import gate_position
 
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
 
-def element_means(points, mesh, name):
+
+def element_means(
+    points: xr.Dataset, mesh: xr.Dataset, name: str | NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Volume-weighted mean of a variable of the points in every element; NaN where there is none.
 
     Parameters
@@ -33,7 +43,7 @@ def element_means(points, mesh, name):
         ), volume
 
 
-def element_of_points(points, mesh):
+def element_of_points(points: xr.Dataset, mesh: xr.Dataset) -> NDArray[np.int64]:
     """Number of the element that holds each point, -1 for points outside of the mesh or padded."""
     from matplotlib.tri import Triangulation
 
@@ -45,7 +55,9 @@ def element_of_points(points, mesh):
     return element
 
 
-def pore_pressure_steps(points, mesh, nearest, furthest):
+def pore_pressure_steps(
+    points: xr.Dataset, mesh: xr.Dataset, nearest: float, furthest: float
+) -> dict[str, NDArray[np.float64]]:
     """How much the pore pressure of the ground jumps between neighbouring elements around the gate.
 
     Parameters
@@ -86,13 +98,13 @@ def pore_pressure_steps(points, mesh, nearest, furthest):
     return {"jump": np.array(jumps), "deviation": np.array(deviations)}
 
 
-def element_centres(mesh):
+def element_centres(mesh: xr.Dataset) -> NDArray[np.float64]:
     """Centres of all elements, (n_elements, 2) float64 [m]."""
     nodes = mesh["element_nodes"].values
     return np.column_stack([mesh["x"].values[nodes].mean(1), mesh["y"].values[nodes].mean(1)])
 
 
-def element_areas(mesh):
+def element_areas(mesh: xr.Dataset) -> NDArray[np.float64]:
     """Areas of all elements, (n_elements,) float64 [m2]."""
     nodes = mesh["element_nodes"].values
     x, y = mesh["x"].values[nodes], mesh["y"].values[nodes]

@@ -1,9 +1,19 @@
 """The largest and smallest values around a ring, and where they are."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+if TYPE_CHECKING:
+    import xarray as xr
 
-def extremes(dataset, names=("axial_force", "shear_force", "bending_moment"), along="theta"):
+
+def extremes(
+    dataset: xr.Dataset, names: Sequence[str] = ("axial_force", "shear_force", "bending_moment"), along: str = "theta"
+) -> xr.Dataset:
     """Largest and smallest value of each quantity around the ring, with the angles where they are.
 
     Parameters

@@ -1,12 +1,19 @@
 """Fields of the ground on the mesh, snapshot by snapshot: what can be interpolated to an inflow mass."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from coupling.postprocess.elements import element_centres, element_of_points
 from coupling.postprocess.ground_axes import QUANTITIES, point_quantities
 
+if TYPE_CHECKING:
+    import xarray as xr
 
-def element_fields(points, mesh):
+
+def element_fields(points: xr.Dataset, mesh: xr.Dataset) -> xr.Dataset:
     """Means by volume of the points in every element, for every snapshot.
 
     Points have no lasting order in a run file, elements have: fields of elements can be compared between snapshots and

@@ -1,8 +1,16 @@
 """Stresses and pore pressure along the horizontal and vertical axis through the gate, and how far the gate reaches."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from coupling.postprocess.geometry import gate_diameter, gate_position, tunnels
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
 
 #: Initial stresses below this share of the largest on the axis are left out of ratios: those at the ground surface.
 SMALLEST_INITIAL = 0.05
@@ -15,7 +23,7 @@ QUANTITIES = {
 }
 
 
-def point_quantities(points):
+def point_quantities(points: xr.Dataset) -> dict[str, NDArray[np.float64]]:
     """Quantities of :data:`QUANTITIES` of every point, name to array; missing water counts as no pressure."""
     return {
         "soil_stress_vertical": -points["stress_yy"].values,
@@ -25,7 +33,7 @@ def point_quantities(points):
     }
 
 
-def profile(points, direction, spacing=0.5, half_width=0.5):
+def profile(points: xr.Dataset, direction: str, spacing: float = 0.5, half_width: float = 0.5) -> xr.Dataset:
     """Means of the ground's points over cells along an axis through the gate.
 
     Parameters
@@ -86,7 +94,7 @@ def profile(points, direction, spacing=0.5, half_width=0.5):
     ).dropna("distance", how="all")
 
 
-def stress_variation(now, initial):
+def stress_variation(now: xr.DataArray, initial: xr.DataArray) -> xr.DataArray:
     """Stress variation ratio R_sigma = (sigma' - sigma'_0)/sigma'_0; NaN where the initial value is next to none.
 
     Parameters
@@ -106,7 +114,7 @@ def stress_variation(now, initial):
     return ratio.assign_attrs(units="1", long_name="change of the stress over the initial one")
 
 
-def influence_distance(axis, name, threshold=0.05, window=1.5):
+def influence_distance(axis: xr.Dataset, name: str, threshold: float = 0.05, window: float = 1.5) -> xr.DataArray:
     """How far from the gate a quantity has changed by more than a threshold, on the ground's side of the gate.
 
     Rule: the furthest cell where the change of the initial value, as the running mean over `window`, exceeds the
@@ -136,7 +144,7 @@ def influence_distance(axis, name, threshold=0.05, window=1.5):
     )
 
 
-def arch(axis, name="soil_stress_vertical", window=1.5):
+def arch(axis: xr.Dataset, name: str = "soil_stress_vertical", window: float = 1.5) -> xr.Dataset:
     """Where raised soil stress stands: the largest running mean of sigma'/sigma'_0 along an axis, beside the gate.
 
     Parameters

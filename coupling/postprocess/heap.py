@@ -1,13 +1,21 @@
 """The heap of material that has landed inside the tunnel."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from coupling.postprocess.elements import element_areas, element_of_points
 
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
 RESTING_SPEED = 0.5  # m/s; material falling onto the heap moves with several m/s
 
 
-def heap(points, mesh):
+def heap(points: xr.Dataset, mesh: xr.Dataset) -> dict[str, float]:
     """Material that has landed inside the gate's tunnel.
 
     Returns
@@ -44,7 +52,9 @@ def heap(points, mesh):
     }
 
 
-def filled(volume, area, element_nodes):
+def filled(
+    volume: NDArray[np.float64], area: NDArray[np.float64], element_nodes: NDArray[np.integer]
+) -> NDArray[np.bool_]:
     """Elements below the surface of some material: at least half full on the mean of their nodes.
 
     A few points an element make the content of a single one jump by a third; around a node it is even.

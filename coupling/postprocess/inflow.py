@@ -1,9 +1,17 @@
 """States of a run at equal inflow mass, what they are over the initial state, and how evenly material flows in."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+if TYPE_CHECKING:
+    import xarray as xr
 
-def at_inflow(dataset, inflow_mass):
+
+def at_inflow(dataset: xr.Dataset, inflow_mass: float) -> xr.Dataset:
     """State at an inflow mass, linear between the records around its first crossing.
 
     Parameters
@@ -44,7 +52,37 @@ def at_inflow(dataset, inflow_mass):
     return dataset.interp(time=time[after - 1] + share * (time[after] - time[after - 1]), assume_sorted=True)
 
 
-def with_inflow(dataset, history):
+def by_inflow(dataset: xr.Dataset) -> xr.Dataset:
+    """The records over inflow mass instead of time, for selection and interpolation: unique, strictly increasing.
+
+    Of records with the same inflow mass, or less than an earlier one had, the first stays: of the zeros before
+    anything has come in, that is the initial state.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        With `inflow_mass` (time) [kg/m]: pressures, history, response, or the whole of a tree's group.
+
+    Returns
+    -------
+    xarray.Dataset
+        With the dimension `inflow_mass` in place of `time`, which is a coordinate along it.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> mass = [0.0, 0.0, 0.0, 30.0, 29.0, 60.0]
+    >>> run = xr.Dataset({"inflow_mass": ("time", mass)}, coords={"time": [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]})
+    >>> by_inflow(run).sel(inflow_mass=50.0, method="nearest").time.item()
+    5.0
+    """
+    mass = dataset["inflow_mass"].values
+    before = np.maximum.accumulate(np.concatenate([[-np.inf], mass[:-1]]))
+    rising = np.flatnonzero(mass > before)
+    return dataset.isel(time=rising).set_coords("inflow_mass").swap_dims(time="inflow_mass")
+
+
+def with_inflow(dataset: xr.Dataset, history: xr.Dataset) -> xr.Dataset:
     """A dataset over time with the inflow mass of the history at its times, so that :func:`at_inflow` takes it.
 
     Parameters
@@ -55,10 +93,10 @@ def with_inflow(dataset, history):
         With `inflow_mass` (time) [kg/m].
     """
     mass = np.interp(dataset["time"].values, history["time"].values, history["inflow_mass"].values)
-    return dataset.assign(inflow_mass=("time", mass, dict(history["inflow_mass"].attrs)))
+    return dataset.assign_coords(inflow_mass=("time", mass, dict(history["inflow_mass"].attrs)))
 
 
-def pressure_ratio(pressures, name, inflow_mass):
+def pressure_ratio(pressures: xr.Dataset, name: str, inflow_mass: float) -> xr.DataArray:
     """Pressure on the lining at an inflow mass over the initial one, at every angle.
 
     Parameters
@@ -80,13 +118,13 @@ def pressure_ratio(pressures, name, inflow_mass):
     ValueError
         When the run did not get there.
     """
-    now = at_inflow(pressures[[name, "inflow_mass"]], inflow_mass)[name]
+    now = at_inflow(pressures[[name, "inflow_mass"]], inflow_mass)[name].drop_vars("inflow_mass", errors="ignore")
     ratio = now / pressures[name].isel(time=0, drop=True)
     about = pressures[name].attrs.get("long_name", name)
     return ratio.rename(name).assign_attrs(units="1", long_name=f"{about}, over the initial one")
 
 
-def additional_at_inflow(response, inflow_mass):
+def additional_at_inflow(response: xr.Dataset, inflow_mass: float) -> xr.Dataset:
     """What the event has added to the ring's forces and displacements at an inflow mass.
 
     Parameters
@@ -111,7 +149,7 @@ def additional_at_inflow(response, inflow_mass):
     return at_inflow(additional(response), inflow_mass)
 
 
-def ratio_to_initial(pressures, name, inflow_mass, angles):
+def ratio_to_initial(pressures: xr.Dataset, name: str, inflow_mass: float, angles: Sequence[float]) -> float:
     """Mean of a pressure over some angles at an inflow mass, over the same mean of the initial state [-].
 
     angles : sequence of float, degrees from the crown, clockwise; cells of the theta grid nearest to them.
@@ -121,7 +159,7 @@ def ratio_to_initial(pressures, name, inflow_mass, angles):
     return float(now) / float(field.isel(time=0))
 
 
-def inflow_linearity(history, first, last):
+def inflow_linearity(history: xr.Dataset, first: float, last: float) -> tuple[float, float]:
     """Straight-line fit of inflow mass over time between two inflow masses [kg/m].
 
     Returns

@@ -1,9 +1,16 @@
 """The settlement of the ground surface and the trough it makes."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+if TYPE_CHECKING:
+    import xarray as xr
 
-def surface_settlement(points, spacing=1.0, depth=1.0):
+
+def surface_settlement(points: xr.Dataset, spacing: float = 1.0, depth: float = 1.0) -> xr.DataArray:
     """Settlement of the ground surface: mean of the points that started in its uppermost layer.
 
     Parameters
@@ -58,7 +65,7 @@ def surface_settlement(points, spacing=1.0, depth=1.0):
     )
 
 
-def trough(settlement):
+def trough(settlement: xr.DataArray) -> xr.Dataset:
     """Gauss curve s = s_max exp(-(x - x_0)^2/(2 i^2)) closest to the settlement of every time.
 
     Parameters
@@ -104,7 +111,7 @@ def trough(settlement):
         ("centre", "m", "middle of the trough"),
         ("width", "m", "distance i from the middle of the trough to its inflection"),
         ("r_squared", "1", "coefficient of determination of the Gauss curve"),
-        ("volume", "m2", "area of the trough"),
+        ("volume", "m^2", "area of the trough"),
     )
     columns = np.array(rows).T
     return xr.Dataset(
@@ -114,7 +121,7 @@ def trough(settlement):
     )  # fmt: skip
 
 
-def share_within(settlement, distance, centre=0.0):
+def share_within(settlement: xr.DataArray, distance: float, centre: float = 0.0) -> xr.DataArray:
     """Share of the trough's settlement that lies within a distance of a vertical line [-], over time.
 
     Upward movement counts as none.

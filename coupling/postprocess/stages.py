@@ -1,8 +1,13 @@
 """The stages in which the flow zone grows: slowly, rapidly, hardly any more."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: Places at which the line may bend, evenly over the record; 60 of them decide a bend to 1.7 % of the record.
 BENDS = 60
@@ -25,7 +30,7 @@ class Stages(NamedTuple):
     r_squared: float
 
 
-def flow_zone_stages(history, over="time"):
+def flow_zone_stages(history: xr.Dataset, over: str = "time") -> Stages:
     """Stages of the flow zone: the continuous line of three straight pieces closest to its area (least squares).
 
     Parameters

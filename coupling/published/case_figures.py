@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import matplotlib
 import numpy as np
-from matplotlib.figure import Figure
 
 from coupling.figures import STYLE, _centred, _closed, _crown_up, _radial_ticks
+from coupling.picture import Picture
 from coupling.published.lining_figures import JOINTS
 from coupling.published.sources import at_study_inflow
 
@@ -80,7 +80,7 @@ def joint_deformation(study, inflow_mass, model="beam-spring"):
     now, first = at_study_inflow(one, inflow_mass), one.isel(progress=0, drop=True)
     joints = study["joint"].values
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.4, 6.0), layout="constrained")
+        figure = Picture(figsize=(7.4, 6.0), layout="constrained")
         axes = figure.subplots(len(JOINTS), len(GROUPS), sharey="row")
         for row, (name, (title, scale)) in zip(axes, JOINTS.items(), strict=True):
             added = scale * (now[name] - first[name])
@@ -107,7 +107,7 @@ def _polar(study, rows, title, extra_rows=0):
     """One row of polar panels a quantity, one column a group; rows: title to (angles [degree], (case, angle) array)."""
     count = len(rows) + extra_rows
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.4, 2.9 * count + 0.3), layout="constrained")
+        figure = Picture(figsize=(7.4, 2.9 * count + 0.3), layout="constrained")
         for r, (name, (theta, values)) in enumerate(rows.items()):
             angle, data = np.radians(theta), values.transpose("case", ...).values
             known = data[np.isfinite(data).all(axis=1)]

@@ -5,10 +5,10 @@ from __future__ import annotations
 import matplotlib
 import numpy as np
 from matplotlib.colors import TwoSlopeNorm
-from matplotlib.figure import Figure
 
 from coupling import postprocess
 from coupling.figures import GATE, INITIAL, NOW, SECOND, STYLE, _frame, _Geometry
+from coupling.picture import Picture
 
 
 def mass_colours(count):
@@ -27,7 +27,7 @@ def settlement_troughs(settlement, masses):
         [kg/m]
     """
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(5.6, 3.2), layout="constrained")
+        figure = Picture(figsize=(5.6, 3.2), layout="constrained")
         axis = figure.subplots()
         for mass, colour in zip(masses, mass_colours(len(masses)), strict=True):
             now = postprocess.at_inflow(settlement, mass)["settlement"]
@@ -54,7 +54,7 @@ def inflow_and_stages(history, stages):
     time = history["time"].values
     nodes = [float(time[0]), *stages.bends, float(time[-1])]
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(5.2, 4.6), layout="constrained")
+        figure = Picture(figsize=(5.2, 4.6), layout="constrained")
         upper, lower = figure.subplots(2, 1, sharex=True)
         upper.plot(time, history["inflow_mass"], color=NOW)
         upper.set_ylabel("inflow mass [kg/m]")
@@ -98,7 +98,7 @@ def stresses_along_axes(horizontal, vertical, masses):
     )
     diameter = postprocess.gate_diameter(horizontal)
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 5.4), layout="constrained")
+        figure = Picture(figsize=(7.2, 5.4), layout="constrained")
         axes = figure.subplots(2, 2)
         for axis, (data, name, title) in zip(axes.flat, panels, strict=True):
             # the line breaks at the lining, not where a cell between two elements happens to hold no point
@@ -139,7 +139,7 @@ def stress_variation_fields(fields, mesh, masses, name="soil_stress_vertical"):
     ground = (mesh["region"] == 0).values
     initial = fields[name].isel(time=0, drop=True)
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(3.4 * len(masses) + 0.6, 3.5), layout="constrained")
+        figure = Picture(figsize=(3.4 * len(masses) + 0.6, 3.5), layout="constrained")
         axes = np.atleast_1d(figure.subplots(1, len(masses), sharey=True))
         for axis, mass in zip(axes, masses, strict=True):
             now = postprocess.at_inflow(fields[[name, "inflow_mass"]], mass)[name]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import matplotlib
 import numpy as np
-from matplotlib.figure import Figure
 
 from coupling import postprocess
 from coupling.figures import INITIAL, NOW, STYLE, _closed, _crown_up, _Geometry, _legend_below, _radial_ticks
+from coupling.picture import Picture
 from coupling.published.ground_figures import mass_colours
 
 PRESSURES = {"soil_pressure": "soil pressure", "water_pressure": "water pressure"}
@@ -17,7 +17,7 @@ FORCES = {
     "bending_moment": "bending moment M [kN m/m]",
 }
 JOINTS = {
-    "joint_opening": ("opening [mm]", 1e3),
+    "joint_opening": ("opening (+) or closing (\N{MINUS SIGN}) [mm]", 1e3),
     "joint_dislocation": ("dislocation [mm]", 1e3),
     "joint_rotation": ("rotation [mrad]", 1e3),
 }
@@ -36,7 +36,7 @@ def initial_pressures(pressures, theory):
     first = pressures.isel(time=0)
     tunnels = [first] if "tunnel" not in first.dims else [first.isel(tunnel=k) for k in range(first.sizes["tunnel"])]
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(3.5 * len(tunnels), 3.2), layout="constrained")
+        figure = Picture(figsize=(3.5 * len(tunnels), 3.2), layout="constrained")
         axes = np.atleast_1d(figure.subplots(1, len(tunnels), sharey=True))
         for k, (axis, ours, theirs) in enumerate(zip(axes, tunnels, theory, strict=True)):
             for (name, title), colour in zip(PRESSURES.items(), ("#8a5a00", NOW), strict=True):
@@ -85,7 +85,7 @@ def _rings(pressures, panels, labels):
     angle = np.radians(pressures["theta"].values)
     colours = [INITIAL, *mass_colours(len(labels) - 1)]
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 4.0), layout="constrained")
+        figure = Picture(figsize=(7.2, 4.0), layout="constrained")
         axes = figure.subplots(1, 2, subplot_kw={"projection": "polar"})
         for axis, (title, rows) in zip(axes, panels.values(), strict=True):
             _crown_up(axis)
@@ -115,7 +115,7 @@ def forces_by_inflow(response, masses):
     states += [(f"{mass:.0f} kg/m", postprocess.at_inflow(response, mass)) for mass in masses]
     colours = [INITIAL, *mass_colours(len(masses))]
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.4, 3.2), layout="constrained")
+        figure = Picture(figsize=(7.4, 3.2), layout="constrained")
         axes = figure.subplots(1, 3, subplot_kw={"projection": "polar"})
         for axis, (name, title) in zip(axes, FORCES.items(), strict=True):
             _crown_up(axis)
@@ -145,7 +145,7 @@ def extremes_over_inflow(responses):
         By lining model.
     """
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.4, 2.8), layout="constrained")
+        figure = Picture(figsize=(7.4, 2.8), layout="constrained")
         axes = figure.subplots(1, 3)
         for (model, response), style in zip(responses.items(), ("-", "--", ":", "-."), strict=False):
             found = postprocess.extremes(response)
@@ -165,7 +165,7 @@ def joints_over_inflow(response):
     """Opening, dislocation and rotation of every joint over inflow mass, response of one lining model."""
     mass = response["inflow_mass"]
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.4, 2.8), layout="constrained")
+        figure = Picture(figsize=(7.4, 2.8), layout="constrained")
         axes = figure.subplots(1, 3)
         for axis, (name, (title, scale)) in zip(axes, JOINTS.items(), strict=True):
             for k, joint in enumerate(response["joint"].values):

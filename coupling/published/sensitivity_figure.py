@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import matplotlib
 import numpy as np
-from matplotlib.figure import Figure
 
 from coupling.figures import NOW, STYLE
+from coupling.picture import Picture
 from coupling.published.sources import at_study_inflow
 
 UNITS = {
@@ -75,7 +75,7 @@ def sensitivity_figure(table):
     first, rows = table["rows"][0], table["rows"][1:]
     names = list(table["units"])
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(1.1 * len(names) + 3.0, 1.0 + 0.24 * max(len(rows), 1)), layout="constrained")
+        figure = Picture(figsize=(1.1 * len(names) + 3.0, 1.0 + 0.24 * max(len(rows), 1)), layout="constrained")
         panels = figure.subplots(1, len(names), sharey=True)
         place = np.arange(len(rows))[::-1]
         for axis, name in zip(panels, names, strict=True):

@@ -1,5 +1,5 @@
 // Charts in SVG: over an axis, and around a ring. Both take rows of values and are redrawn by `set`; `marks` point at
-// the gaps: [{angle, text, colour}], colour and text may be missing.
+// places: [{angle, text, colour}], colour and text may be missing.
 const WIDTH = 360;  // of every chart, in its own units; the page scales them
 const COLOURS = ["#0b5394", "#b04a00", "#2f6f1e", "#6a3d9a", "#a31621", "#00656e", "#7a5c00", "#4a4f57"];
 const DASHES = ["none", "8 3", "2 3", "8 3 2 3"];

@@ -1,17 +1,17 @@
 // Pictures of the ground: points coloured by a field and the mesh, on canvas; the section through the ground, in SVG.
 function liningPath(pen, at, size) {
   data.section.tunnels.forEach((t, k) => {
-    const gap = gate && gate.tunnel === k ? gate : null;
-    // the walls of the gap are parallel: its angle differs on the two faces
+    const open = gate && gate.tunnel === k ? gate : null;
+    // the walls of the gate are parallel: its angle differs on the two faces
     const faces = [t.outer, t.inner].map((r) => {
-      const half = gap ? Math.asin(gap.width / 2 / r) : 0, middle = gap ? gap.angle * Math.PI / 180 : 0;
+      const half = open ? Math.asin(open.width / 2 / r) : 0, middle = open ? open.angle * Math.PI / 180 : 0;
       return Array.from({ length: 361 }, (_, j) => {
         const a = middle + half + (2 * Math.PI - 2 * half) * j / 360;
         return at(t.x + r * Math.sin(a), t.y + r * Math.cos(a));
       });
     });
     pen.beginPath();
-    if (gap) {
+    if (open) {
       [...faces[0], ...faces[1].reverse()].forEach(([x, y], j) => (j ? pen.lineTo(x, y) : pen.moveTo(x, y)));
       pen.closePath();
     } else {
@@ -164,7 +164,7 @@ class MeshView extends CanvasView {
       pen.stroke();
     }
     this.finish(view);
-    const told = `Ground${gate ? ", gap (red), inside of the tunnel (blue)" : ""}; view: ${this.choice.selectedOptions[0].textContent}.`;
+    const told = `Ground${gate ? ", gate (red), inside of the tunnel (blue)" : ""}; view: ${this.choice.selectedOptions[0].textContent}.`;
     caption("mesh", sentence(data.mesh.whole ? told : `${told} Only the triangles nearest to the tunnel are in this page.`));
     this.canvas.setAttribute("aria-label", told);
   }
@@ -198,7 +198,7 @@ function drawSection() {
   });
   element("text", { x: 210, y: bottom + 18, "text-anchor": "middle", class: "tick" }, svg,
     `${shown(box.width)} m wide, ${shown(box.depth)} m deep`);
-  const told = `${soils.map((s) => s.name).join(", ")}; ${data.section.tunnels.length} tunnel(s)${gate ? `, gap at ${gate.angle}° (red)` : ""}`;
+  const told = `${soils.map((s) => s.name).join(", ")}; ${data.section.tunnels.length} tunnel(s)${gate ? `, gate at ${gate.angle}° (red)` : ""}`;
   caption("section", sentence(told));
   svg.setAttribute("aria-label", `section through the ground: ${told}`);
 }

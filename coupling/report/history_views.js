@@ -4,7 +4,7 @@ class TimeChart {
   constructor(key, svg, lines, onPick, { fromZero = true, unit = "" } = {}) {
     Object.assign(this, { key, svg, lines, unit, names: [...new Set(lines.map((l) => l.name))] });
     const range = roundRange(rangeOf(lines.map((l) => rangeOf([l.values], l.factor)), 1), fromZero);
-    this.chart = new LineChart(svg, { x: lines[0].time, xLabel: "time since the gap opened [s]", yRange: range,
+    this.chart = new LineChart(svg, { x: lines[0].time, xLabel: "time since the gate opened [s]", yRange: range,
       classes: lines.map(() => "line"), styles: lines.map((l) => l.style), onPick });
     lines.forEach((line, k) => this.chart.set(k, line.values, line.factor));
     const of = (name) => lines.filter((l) => l.name === name);
@@ -40,8 +40,8 @@ function timeCharts(onPick) {
   return [...made, ...recordedCharts(onPick)];
 }
 
-// "kg m-1" as kg/m, "m2" as m²
-const readable = (units) => (units === "1" ? "" : units.replace(/ (\w+)-1/g, "/$1").replace(/m2\b/, "m²"));
+// "m^2" as m², and "kg m-1" of older files as kg/m
+const readable = (units) => (units === "1" ? "" : units.replace(/ (\w+)-1/g, "/$1").replace(/m\^?2\b/, "m²"));
 
 function recordedCharts(onPick) {
   const place = document.getElementById("history"), made = [];

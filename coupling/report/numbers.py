@@ -28,19 +28,23 @@ RING_EXTREMES = {
     "shear_force_min": ("shear force Q, smallest", "kN/m", 1e-3),
     "bending_moment_max": ("bending moment M, largest", "kN m/m", 1e-3),
     "bending_moment_min": ("bending moment M, smallest", "kN m/m", 1e-3),
-    "joint_opening_max": ("joint opening, largest", "mm", 1e3),
+    "joint_opening_max": ("joint opening (+) or closing (−), largest", "mm", 1e3),
     "joint_rotation_max": ("joint rotation, largest size", "mrad", 1e3),
-    "convergence_horizontal": ("horizontal diameter shortens by", "mm", 1e3),
-    "convergence_vertical": ("vertical diameter shortens by", "mm", 1e3),
+    "convergence_horizontal": ("horizontal diameter shorter (+) or longer (−)", "mm", 1e3),
+    "convergence_vertical": ("vertical diameter shorter (+) or longer (−)", "mm", 1e3),
 }
 SHEAR_LIMIT = 0.05  # of the largest Q; the slope of M is taken over one element
 THEORY_LIMIT = 0.02  # of the mean pressure; an element at the lining sees the depth of its middle
 
 
+DIFFERENCE = "difference from"
+
+
 class Number(NamedTuple):
     """A number of the run: SI values and how they are shown.
 
-    initial, final : float or None;  scale : factor from SI to `unit`;  error : float (SI) or None;  basis : str.
+    initial, final : float or None;  scale : factor from SI to `unit`;  error : float (SI) or None;  basis : str, what
+    the error is; one that begins with `DIFFERENCE` is no error but how far another lining model is from this one.
     """
 
     key: str
@@ -51,6 +55,11 @@ class Number(NamedTuple):
     final: float | None
     error: float | None
     basis: str
+
+    @property
+    def is_difference(self):
+        """Whether `error` is the difference from another lining model."""
+        return self.basis.startswith(DIFFERENCE)
 
 
 def key_numbers(run):
@@ -151,10 +160,10 @@ def _pressure_numbers(lining, tunnel):
     for name, label in (("soil_pressure", "soil"), ("water_pressure", "water")):
         for place, theta in PLACES.items():
             series, spread = lining[name].sel(theta=theta).values, lining[f"{name}_std"].sel(theta=theta).values
-            open_here = tunnel is None and len(series) > 1 and _in_gap(lining.attrs, theta)
+            open_here = tunnel is None and len(series) > 1 and _in_gate(lining.attrs, theta)
             numbers.append(
                 Number(
-                    f"{key}{name}_{theta}", f"{label}, {place}{' (the gap)' if open_here else ''}", "kPa", 1e-3,
+                    f"{key}{name}_{theta}", f"{label}, {place}{' (the gate)' if open_here else ''}", "kPa", 1e-3,
                     float(series[0]), None if open_here else float(series[-1]),
                     None if open_here else scatter(series, spread[-1]), "scatter of the last records",
                 )
@@ -162,8 +171,8 @@ def _pressure_numbers(lining, tunnel):
     return numbers
 
 
-def _in_gap(geometry, theta):
-    """Whether an angle [degree] lies in the gap, where the open lining carries no pressure."""
+def _in_gate(geometry, theta):
+    """Whether an angle [degree] lies in the gate, where the open lining carries no pressure."""
     if "gate_angle" not in geometry:
         return False
     outer = float(np.atleast_1d(geometry["tunnel_outer_radius"])[int(geometry["gate_tunnel"])])
@@ -224,7 +233,8 @@ def _ring_numbers(run, tunnel):
         rows, present = match_times(responses[name]["time"].values, first["time"].values[-1:])
         if present[0]:
             others.append(ring_extremes(responses[name], int(rows[0])))
-    basis = f"difference from {', '.join(models[1:])}" if others else "none: one lining model, nothing to compare with"
+    labels = ", ".join(models[1:]) if others else "another lining model: there is none"
+    basis = f"{DIFFERENCE} {labels}"
     return [
         Number(key if tunnel is None else f"tunnel_{tunnel}_{key}", label, unit, scale, start[key], end[key],
                max((abs(other[key] - end[key]) for other in others if key in other), default=None), basis)
@@ -314,7 +324,7 @@ def warnings(run, attributes, quality_rows):
         if not model_names(run, tunnel):
             found.append(f"No lining model has answered for tunnel {tunnel}: run `gush respond` on this run.")
     for name in models:
-        answered = run[f"structure/{name}"].sizes.get("time", 0)
+        answered = run[structure_group(name)].sizes.get("time", 0)
         if answered != records:
             found.append(f"The response of {name} holds {answered} of {records} records: run `gush respond` again.")
     if "soil_pressure" in lining and records > 1:

@@ -1,5 +1,7 @@
 """A report as one file: of a run or of a study, told apart by what lies in the folder, put together and written."""
 
+from __future__ import annotations
+
 import contextlib
 import os
 import tempfile
@@ -13,7 +15,7 @@ from coupling.run_folder import REPORT_FILE, RUN_FILE, RunRefused
 MARK = '<meta name="generator" content="gushing report">'
 
 
-def write_report(path, out=None, model=None):
+def write_report(path: str | Path, out: str | Path | None = None, model: str | None = None) -> Path:
     """Write the page about a run or a study.
 
     Parameters
@@ -59,7 +61,7 @@ def write_report(path, out=None, model=None):
     return target
 
 
-def write_run_reports(folder):
+def write_run_reports(folder: str | Path) -> list[Path]:
     """Write the pages of all runs of a study beside them; a run without a record gets none. Returns their paths."""
     from coupling.datasets import RunFileError
     from coupling.studies.case import RUN_FOLDER
@@ -75,7 +77,7 @@ def write_run_reports(folder):
     return written
 
 
-def study_folder(path):
+def study_folder(path: str | Path) -> Path | None:
     """The folder of a study that a path names; None where it can only be a run.
 
     Raises
@@ -112,7 +114,7 @@ def _checked_path(folder, out):
     return path
 
 
-def is_report(path):
+def is_report(path: str | Path) -> bool:
     """Whether a file is a page that :func:`write_report` wrote."""
     with open(path, "rb") as stream:
         return MARK.encode() in stream.read(1000)

@@ -12,7 +12,7 @@ class RingChart {
   build() {
     const lines = this.sources(), svg = document.getElementById(this.key);
     const range = roundRange(rangeOf(this.compared(), this.factor), true);
-    const options = { x: this.angles, yRange: range, marks: gate && gate.tunnel === tunnel ? [{ angle: gate.angle, text: "gap" }] : [],
+    const options = { x: this.angles, yRange: range, marks: gate && gate.tunnel === tunnel ? [{ angle: gate.angle, text: "gate" }] : [],
       classes: ["initial", ...lines.map((_, k) => modelClass(k))] };
     this.chart = shape === "polar" ? new PolarChart(svg, options) : new LineChart(svg, { ...options,
       xLabel: "angle from the crown, clockwise [°]", xTicks: [0, 60, 120, 180, 240, 300, 360], height: 250 });
@@ -131,7 +131,7 @@ class DeformedRing {
 }
 
 const JOINT_COLUMNS = [["joint_axial_force", "N"], ["joint_shear_force", "Q"], ["joint_bending_moment", "M"],
-  ["joint_opening", "opening"], ["joint_dislocation", "dislocation"], ["joint_rotation", "rotation"]];
+  ["joint_opening", "opening (+) or closing (−)"], ["joint_dislocation", "dislocation"], ["joint_rotation", "rotation"]];
 
 function drawJointTable(frame) {
   const body = tableWith(document.getElementById("joint-table"), "Now; below each value that of the start.",
@@ -160,11 +160,11 @@ const most = (values) => -least(values.map((v) => -v));
 const MODEL_ROWS = [
   ...[["axial_force", "axial force N"], ["shear_force", "shear force Q"], ["bending_moment", "bending moment M"]].flatMap(
     ([key, name]) => [[`${name}, largest`, key, "fields", most], [`${name}, smallest`, key, "fields", least]]),
-  ["joint opening, largest", "joint_opening", "joints", most],
+  ["joint opening (+) or closing (−), largest", "joint_opening", "joints", most],
   ["joint dislocation, largest size", "joint_dislocation", "joints", biggest],
   ["joint rotation, largest size", "joint_rotation", "joints", biggest],
-  ["horizontal diameter shortens by", "convergence_horizontal", "series", (v) => v[0]],
-  ["vertical diameter shortens by", "convergence_vertical", "series", (v) => v[0]],
+  ["horizontal diameter shorter (+) or longer (−)", "convergence_horizontal", "series", (v) => v[0]],
+  ["vertical diameter shorter (+) or longer (−)", "convergence_vertical", "series", (v) => v[0]],
   ["settlement", "settlement", "series", (v) => v[0]],
 ];
 

@@ -1,4 +1,4 @@
-// The numbers of a run: pressures and responses at the times of the slider, histories, where tunnel and gap are.
+// The numbers of a run: pressures and responses at the times of the slider, histories, where tunnel and gate are.
 const times = unpack(data.time).values, inflow = unpack(data.inflow_mass).values;
 const tunnels = data.lining ? data.lining.tunnels.map(unpackAll) : [];
 const unpackModel = (model) => ({

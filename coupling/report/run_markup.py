@@ -52,19 +52,23 @@ def _numbers(groups, summary):
 <h2 id="numbers">Key numbers</h2>
 <dl class="cards">{cards}</dl>
 <div class="grid groups">{tables}</div>
-<p class="fine">The estimates come from this run alone: what it conserves, how much neighbouring records scatter,
-another lining model. The error of mesh and time step is not among them; a finer run shows it.</p>
+<p class="fine">The estimates come from this run alone: how much neighbouring records scatter, and how far another
+lining model is from the first, which is no error of either. The error of mesh and time step is not among them; a finer
+run shows it.</p>
 </section>"""
 
 
 def _number_table(k, title, numbers):
     shared, with_start = {n.basis for n in numbers}, any(n.initial is not None for n in numbers)
-    caption = f"<caption>Error: {escape(shared.pop())}.</caption>" if len(shared) == 1 else ""
+    word = "difference" if all(n.is_difference for n in numbers) else "error"
+    basis = shared.pop() if len(shared) == 1 else ""
+    told = basis if word == "difference" else f"error: {basis}"
+    caption = f"<caption>{escape(told[:1].upper() + told[1:])}.</caption>" if basis else ""
     rows = "".join(_number_row(n, with_start, not caption) for n in numbers)
     start = '<th scope="col">start</th>' if with_start else ""
     return f"""<section><h3 id="numbers-{k}">{escape(title)}</h3>
 <div class="scroll" role="region" aria-labelledby="numbers-{k}" tabindex="0"><table class="numbers">{caption}
-<thead><tr><th scope="col">quantity</th>{start}<th scope="col">end</th><th scope="col">error</th></tr></thead>
+<thead><tr><th scope="col">quantity</th>{start}<th scope="col">end</th><th scope="col">{word}</th></tr></thead>
 <tbody>{rows}</tbody></table></div></section>"""
 
 
@@ -74,7 +78,8 @@ def _number_row(n, with_start, with_basis):
 
     basis = f"<small>{escape(n.basis)}</small>" if n.basis and with_basis else ""
     # an error is known to two digits at best
-    error = "–" if n.error is None else f"± {shown(float(f'{n.error * n.scale:.2g}'))}"
+    sign = "" if n.is_difference else "± "
+    error = "–" if n.error is None else f"{sign}{shown(float(f'{n.error * n.scale:.2g}'))}"
     return (
         f'<tr data-key="{n.key}"><th scope="row">{escape(n.label)} <span class="unit">[{escape(n.unit)}]</span>{basis}'
         f"</th>{f'<td>{value(n.initial)}</td>' if with_start else ''}"
@@ -90,7 +95,7 @@ def _player(player):
         tools = (
             f'<div class="tools"><label>Field <select id="field">{options}</select></label>'
             '<label>View <select id="field-view"><option value="tunnel">around the tunnel</option>'
-            '<option value="gate">at the gap</option></select></label></div>'
+            '<option value="gate">at the gate</option></select></label></div>'
         )
         parts.append(figure("fields", "Ground around the tunnel", "", "canvas", tools))
     parts.append(figure("inflow_mass", "Inflow mass", "kg/m", "svg"))
@@ -163,7 +168,7 @@ def _scene(data):
         )
         tools = (
             '<div class="tools"><label>View <select id="mesh-view"><option value="tunnel">around the tunnel</option>'
-            '<option value="gate">at the gap</option><option value="box">whole box</option></select></label></div>'
+            '<option value="gate">at the gate</option><option value="box">whole box</option></select></label></div>'
         )
         mesh_figure = figure("mesh", "Mesh", "", "canvas", tools)
     return f"""<section aria-labelledby="scene">

@@ -2,7 +2,7 @@
 
 import xarray as xr
 
-from coupling.datasets import RunFileError, read_run, run_file, structure_group
+from coupling.datasets import RunFileError, identifier, read_run, run_file, structure_group
 from coupling.report.fields import field_snapshots, mesh_picture
 from coupling.report.numbers import key_numbers, quality, warnings
 from coupling.report.packing import packed
@@ -72,7 +72,7 @@ def _led_by(tree, model):
             f"{', '.join(model_names(tree)) or 'none'}: run gush respond first"
         )
     groups = tree.to_dict()
-    first = {path: groups[path] for path in groups if path.rpartition("/")[2] == model or path == "/"}
+    first = {path: groups[path] for path in groups if path.rpartition("/")[2] == identifier(model) or path == "/"}
     return xr.DataTree.from_dict(first | groups)
 
 

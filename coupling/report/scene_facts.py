@@ -47,7 +47,7 @@ def facts(scene):
             f"friction {tunnel.friction_coefficient:g}",
         ))  # fmt: skip
     if s.gate is not None:
-        rows.append(("gap in the lining", f"{1e3 * s.gate.width:g} mm wide, {s.gate.angle:g}° from the crown"))
+        rows.append(("gate in the lining", f"{1e3 * s.gate.width:g} mm wide, {s.gate.angle:g}° from the crown"))
     stops = [f"{s.stop.inflow_mass:g} kg/m of inflow"] if s.stop.inflow_mass is not None else []
     stops += [f"{s.stop.time:g} s"] if s.stop.time is not None else []
     rows.append(("until", " or ".join(stops)))

@@ -31,9 +31,10 @@ def choose_frames(run):
 
 
 def model_names(run, tunnel=None):
-    """Lining models that have answered for a tunnel, None: that with the gate; the leading one first."""
+    """Lining models by their users' names that answered for a tunnel (None: that with the gate), the leading first."""
     home = structure_group("", tunnel).rstrip("/")
-    return list(run[home].children) if home in run.children else []
+    answered = run[home].children if home in run.children else {}
+    return [str(response.attrs.get("model", group)) for group, response in answered.items()]
 
 
 def tunnels_beside(run):
@@ -125,7 +126,7 @@ def history_series(run):
                 "label": variable.attrs.get("long_name", name),
                 **packed(variable.values),
             }
-            for name, variable in kept.data_vars.items()
-            if variable.dims == ("time",) and name != "dt_limit"
+            for name, variable in {**kept.data_vars, **kept.coords}.items()
+            if name != "time" and variable.dims == ("time",) and name != "dt_limit"
         },
     }

@@ -4,7 +4,7 @@ const PRESSURES = ["soil_pressure", "water_pressure", "soil_shear"], FORCES = ["
 
 function gapMarks(shownCases) {
   const angles = [...new Set(shownCases.map((one) => one.gate).filter((angle) => angle !== null))];
-  if (angles.length < 2) return angles.map((angle) => ({ angle, text: "gap" }));
+  if (angles.length < 2) return angles.map((angle) => ({ angle, text: "gate" }));
   // cases that share an angle share a mark; a case alone at its angle gives it its colour
   return angles.map((angle) => {
     const here = shownCases.filter((one) => one.gate === angle);
@@ -103,7 +103,7 @@ class CaseLines {
 }
 
 function studyCharts() {
-  const time = "time since the gap opened [s]", mass = "inflow mass [kg/m]", made = PRESSURES.map((key) => new RingComparison(key));
+  const time = "time since the gate opened [s]", mass = "inflow mass [kg/m]", made = PRESSURES.map((key) => new RingComparison(key));
   if (data.models.length) made.push(...FORCES.map((key) => new RingComparison(key)));
   const overTime = (y) => (one) => [{ x: one.overMass.time.values, y: y(one) }];
   made.push(new CaseLines("inflow_over_time", time, overTime((one) => one.mass), { unit: "kg/m", fromZero: true }));

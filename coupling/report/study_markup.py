@@ -17,8 +17,8 @@ COLUMNS = {
     "shear_force_min": "smallest Q",
     "bending_moment_max": "largest M",
     "bending_moment_min": "smallest M",
-    "joint_opening_max": "joint opening",
-    "convergence_vertical": "vertical convergence",
+    "joint_opening_max": "joint opening (+) or closing (−)",
+    "convergence_vertical": "vertical diameter shorter (+) or longer (−)",
 }
 PROGRESS_CHARTS = (
     ("inflow_over_time", "Inflow mass over time", "kg/m"),
@@ -29,9 +29,9 @@ MASS_CHARTS = (
     ("axial_over_mass", "Largest and smallest N", "kN/m"),
     ("shear_over_mass", "Largest and smallest Q", "kN/m"),
     ("moment_over_mass", "Largest and smallest M", "kN m/m"),
-    ("opening_over_mass", "Largest joint opening", "mm"),
+    ("opening_over_mass", "Largest joint opening (+) or closing (−)", "mm"),
     ("rotation_over_mass", "Largest size of joint rotation", "mrad"),
-    ("convergence_over_mass", "Vertical convergence", "mm"),
+    ("convergence_over_mass", "Vertical diameter shorter (+) or longer (−)", "mm"),
 )
 
 
@@ -114,7 +114,7 @@ def _results(cases):
     rows = "".join(_result_row(case, parameters, columns) for case in finished)
     errors = any(n.error is not None for case in finished for n in case["numbers"])
     about = (
-        "Second line: ± the largest difference from the other lining models"
+        "Second line: Δ, how far other lining models are from the first, which is no error of either"
         if errors
         else "No error estimate: one lining model, nothing to compare with"
     )
@@ -136,8 +136,7 @@ def _result_row(case, parameters, columns):
         if number is None or number.final is None:
             cells.append(_cell(None))
             continue
-        # an error is known to two digits at best
-        error = "" if number.error is None else f"± {shown(float(f'{number.error * number.scale:.2g}'))}"
+        error = "" if number.error is None else f"Δ {shown(float(f'{number.error * number.scale:.2g}'))}"
         cells.append(_cell(number.final * number.scale, small=error, key=key))
     cells += [_cell(case["cpu_seconds"]), _cell(case["wall_seconds"]), _cell(len(case["warnings"]))]
     return (
@@ -205,7 +204,7 @@ Page Up and Page Down leap, space plays.</p>
 <div class="tools"><label>Ring charts <select id="shape"><option value="polar">around the ring</option>
 <option value="unrolled">unrolled over the angle</option></select></label>
 <label>Show <select id="against"><option value="value">values</option>
-<option value="change">change since the gap opened</option></select></label>{model}</div>
+<option value="change">change since the gate opened</option></select></label>{model}</div>
 <section aria-labelledby="around"><h3 id="around">Around the lining at this inflow mass</h3>
 <div class="grid three">{around}</div></section>
 <section aria-labelledby="progress"><h3 id="progress">Progress of the gushing</h3>
@@ -213,7 +212,7 @@ Page Up and Page Down leap, space plays.</p>
 <div class="grid three">{progress}</div></section>
 {forces}
 <h3 id="now-title">Cases at this inflow mass</h3>
-<p class="about">Values of the inflow mass nearest to the slider; below each value its change since the gap opened.</p>
+<p class="about">Values of the inflow mass nearest to the slider; below each value its change since the gate opened.</p>
 {scroll("now-title", table)}
 </section>"""
 

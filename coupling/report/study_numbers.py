@@ -4,6 +4,7 @@ import numpy as np
 
 from coupling.quality import ERRORS, poor_errors
 from coupling.report.numbers import (
+    DIFFERENCE,
     RING_EXTREMES,
     THEORY_LIMIT,
     Number,
@@ -55,7 +56,9 @@ def case_numbers(dataset, models):
             continue
         others = [abs(other[end] - values[0][end]) for other in values[1:]]
         error = _finite(max(others)) if others else None
-        numbers.append(Number(key, label, unit, scale, _finite(values[0][0]), _finite(values[0][end]), error, ""))
+        numbers.append(
+            Number(key, label, unit, scale, _finite(values[0][0]), _finite(values[0][end]), error, DIFFERENCE)
+        )
     return numbers
 
 

@@ -6,7 +6,7 @@ const NOW_COLUMNS = [
     (one, r) => one.extremes[`${key}_max`].values[r]]),
   ...[["axial_force_max", "largest N"], ["axial_force_min", "smallest N"], ["shear_force_max", "largest Q"],
     ["shear_force_min", "smallest Q"], ["bending_moment_max", "largest M"], ["bending_moment_min", "smallest M"],
-    ["joint_opening_max", "joint opening"], ["convergence_vertical", "vertical convergence"]].map(([key, name]) => {
+    ["joint_opening_max", "joint opening (+) or closing (−)"], ["convergence_vertical", "vertical diameter shorter (+) or longer (−)"]].map(([key, name]) => {
     const [unit, factor] = QUANTITIES[key.replace(/_(max|min)$/, "")];
     return [key, name, unit, factor, (one, r) => one.models[model]?.extremes[key]?.values[r]];
   }),

@@ -3,9 +3,10 @@
 A step is affine in the state about a rest state as long as points stay in their elements, soils are elastic and
 pore pressures positive. So differences of steps from perturbed states are the columns of the matrix. A step adds to
 a point only what nodes and elements carry; therefore a small space is invariant, and what lies outside of it keeps
-its value or shrinks: velocities interpolated from the nodes, stresses constant in an element, pressures that are the
-sum of both, and the projected pressure at the nodes. The matrix is formed on that space, and `Amplification.leak`
-measures how invariant it was.
+its value or shrinks: velocities interpolated from the nodes, stresses constant in an element, pressures linear in it.
+The matrix is formed on that space, and `Amplification.leak` measures how invariant it was. Its step begins where points
+have new velocities and not yet the stresses of them: there the points are all of the state, also where the stress that
+acts runs ahead of theirs.
 """
 
 import math
@@ -14,10 +15,33 @@ from dataclasses import dataclass
 import numpy as np
 
 from coupling.verification.boxes import box_mesh
-from mpm.scene import Scene
+from mpm.long_step import ADVANCE, FOLLOW, PLAN, REMAP, SOLVE
+from mpm.scene import Numerics, Scene
 from mpm.solver import Solver
 from mpm.spectrum import Spectrum, spectral_time_step
-from mpm.variables import SXX, SXY, SYY, V_P, VLX, VLY, VSX, VSY, P, X, Y
+from mpm.variables import (
+    B_ML,
+    B_MN,
+    B_MS,
+    B_PLX,
+    B_PLY,
+    B_PSX,
+    B_PSY,
+    SXX,
+    SXY,
+    SYY,
+    V_ML,
+    V_MS,
+    VLX,
+    VLY,
+    VSX,
+    VSY,
+    P,
+    X,
+    Y,
+)
+
+DEFAULT = Numerics()
 
 # Excess of the spectral radius over 1 that ends stability. At the limit a pair of eigenvalues splits at -1, and one per
 # cent further the excess is above 0.1. What grows by less is not hidden: `critical_map` keeps it as `excess`.
@@ -56,7 +80,7 @@ class Column:
         Largest shift of the inner nodes over the cell [-].
     drainage
         As in `mpm.scene.Water`.
-    pic_rate, pressure_filter, volumetric_smoothing, remapping
+    pic_rate, pressure_filter, stress_damping
         As in `mpm.scene.Numerics`.
     """
 
@@ -71,10 +95,9 @@ class Column:
     positions: str = "layout"
     seed: int = 0
     skew: float = 0.0
-    pic_rate: float = 10.0
-    pressure_filter: float = 0.2
-    volumetric_smoothing: bool = True
-    remapping: bool = True
+    pic_rate: float = DEFAULT.pic_rate
+    pressure_filter: float = DEFAULT.pressure_filter
+    stress_damping: float = DEFAULT.stress_damping
     poissons_ratio: float = 0.3
     drainage: str = "two-phase"
 
@@ -99,8 +122,7 @@ class Column:
             "discretisation": {**size, "gate_radius": self.size, "points_per_element": self.points},
             "numerics": {
                 "courant": 1.0, "pic_rate": self.pic_rate, "pressure_filter": self.pressure_filter,
-                "volumetric_smoothing": self.volumetric_smoothing, "remapping": self.remapping,
-                "critical_step": "altitude" if self.remapping else "spectral", "local_time_stepping": False,
+                "stress_damping": self.stress_damping, "critical_step": "altitude", "local_time_stepping": False,
             },
             "stop": {"time": 1.0},
             "output": {"interval": 1.0},
@@ -123,10 +145,21 @@ class SteppedAt(Solver):
     """The solver, with steps of a length that is asked for instead of the length that its limit allows."""
 
     def step_of(self, dt):
-        """Map the points as they are and advance by dt [s], whatever the critical time step."""
+        """Advance by dt [s], whatever the critical time step: from where points have moved to where they have again."""
         self.map_points()
+        self.momenta[:] = self.sums[:, :, [B_PSX, B_PSY, B_PLX, B_PLY]]
+        held = self.nodal_sums()
+        self.nodes[:, V_MS], self.nodes[:, V_ML] = held[:, B_MS], held[:, B_ML]
+        if self.scene.is_undrained:
+            self.nodes[:, V_MS] += held[:, B_MN]
+        self.status[:] = 0
         self._limits[:], self.longest_step = (dt, 0.0), math.inf
-        return self.step(dt)
+        return self.step()
+
+    def _advance(self, batch):
+        self._run(PLAN, PLAN, batch)
+        self._run(REMAP, FOLLOW)
+        self._run(SOLVE, ADVANCE)
 
 
 class Amplification:
@@ -150,12 +183,10 @@ class Amplification:
         if column.positions != "layout":
             solver.points[:, [X, Y]] = _placed(solver, column)
         solver.points[:, [SXX, SYY, SXY]] = 0.0
-        solver.nodes[:, V_P] = 0.0
         self._wet = column.bulk_modulus is not None
         speed = solver.wave_speed * SMALL
         stress = speed * solver.wave_speed * 2000.0
         solver.points[:, P] = 10 * stress if self._wet else 0.0  # positive, whatever is added
-        solver.nodes[:, V_P] = solver.points[:, P].max()
         solver.limit_speed = solver.wave_speed
         self.altitude = solver.time_step_estimate()[0]
         self.spectral, _ = spectral_time_step(Spectrum(solver).of_state(), 0.5 * self.altitude)
@@ -166,7 +197,7 @@ class Amplification:
     @property
     def size(self):
         """Number of degrees of freedom."""
-        return sum(basis.shape[1] for _, _, basis, _ in self._spaces)
+        return sum(basis.shape[1] for _, basis, _ in self._spaces)
 
     def matrix(self, dt):
         """Amplification matrix of a step of dt [s]: (size, size) float64."""
@@ -174,15 +205,15 @@ class Amplification:
         self.solver.step_of(dt)
         rest = self._get()
         columns = []
-        for k, (_, _, basis, scale) in enumerate(self._spaces):
+        for k, (_, basis, scale) in enumerate(self._spaces):
             for shape in basis.T:
                 self._set({k: scale * shape})
                 self.solver.step_of(dt)
                 change = [(now - then) for now, then in zip(self._get(), rest, strict=True)]
                 columns.append(np.concatenate([
-                    b.T @ (c / s) for c, (_, _, b, s) in zip(change, self._spaces, strict=True)
+                    b.T @ (c / s) for c, (_, b, s) in zip(change, self._spaces, strict=True)
                 ]))  # fmt: skip
-                for c, (_, _, b, s) in zip(change, self._spaces, strict=True):
+                for c, (_, b, s) in zip(change, self._spaces, strict=True):
                     c = c / s
                     self.leak = max(self.leak, float(np.linalg.norm(c - b @ (b.T @ c)) / max(np.linalg.norm(c), 1e-3)))
         return np.stack(columns, axis=1)
@@ -192,11 +223,11 @@ class Amplification:
         self._set({})
         self.solver.step_of(dt)
         rest = self._get()
-        parts = np.split(state, np.cumsum([basis.shape[1] for _, _, basis, _ in self._spaces])[:-1])
-        self._set({k: s * b @ part for k, ((_, _, b, s), part) in enumerate(zip(self._spaces, parts, strict=True))})
+        parts = np.split(state, np.cumsum([basis.shape[1] for _, basis, _ in self._spaces])[:-1])
+        self._set({k: s * b @ part for k, ((_, b, s), part) in enumerate(zip(self._spaces, parts, strict=True))})
         self.solver.step_of(dt)
         change = zip(self._get(), rest, self._spaces, strict=True)
-        return np.concatenate([b.T @ ((now - then) / s) for now, then, (_, _, b, s) in change])
+        return np.concatenate([b.T @ ((now - then) / s) for now, then, (_, b, s) in change])
 
     def spectral_radius(self, dt):
         """Largest modulus of the eigenvalues at time step dt [s]."""
@@ -224,7 +255,7 @@ class Amplification:
         return low * self.spectral
 
     def _bases(self, speed, stress):
-        """Invariant space: (array of the solver, column, orthonormal basis, scale) a field."""
+        """Invariant space: (column of the points, orthonormal basis, scale) a field."""
         solver = self.solver
         element, geometry = solver.element_of_point, solver.geometry[solver.element_of_point]
         d = solver.points[:, [X, Y]] - geometry[:, 4:6]
@@ -234,25 +265,25 @@ class Amplification:
         for k, weight in enumerate((1 - n1 - n2, n1, n2)):
             np.add.at(hats, (np.arange(len(d)), solver.mesh.elements[element, k]), weight)
         steps = (element[:, None] == np.arange(len(solver.geometry))).astype(float)
-        hats, steps, both = (_orthonormal(a) for a in (hats, steps, np.hstack([hats, steps])))
+        slopes = np.hstack([steps * n1[:, None], steps * n2[:, None]])
+        hats, steps, linear = (_orthonormal(a) for a in (hats, steps, np.hstack([steps, slopes])))
         velocities = (VSX, VSY, VLX, VLY) if self._wet else (VSX, VSY)
-        spaces = [("points", k, hats, speed) for k in velocities]
-        spaces += [("points", k, steps, stress) for k in (SXX, SYY, SXY)]
+        spaces = [(k, hats, speed) for k in velocities]
+        spaces += [(k, steps, stress) for k in (SXX, SYY, SXY)]
         if self._wet:
-            spaces += [("points", P, both, stress), ("nodes", V_P, np.eye(len(solver.mesh.nodes)), stress)]
+            spaces.append((P, linear, stress))
         return spaces
 
     def _set(self, changes):
         _restore(self.solver, self._start)
         for k, values in changes.items():
-            array, column, _, _ = self._spaces[k]
-            getattr(self.solver, array)[:, column] += values
+            self.solver.points[:, self._spaces[k][0]] += values
 
     def _get(self):
-        return [getattr(self.solver, array)[:, column].copy() for array, column, _, _ in self._spaces]
+        return [self.solver.points[:, column].copy() for column, _, _ in self._spaces]
 
 
-ARRAYS = ("points", "nodes", "element_of_point", "start", "order", "occupied", "volume")
+ARRAYS = ("points", "nodes", "element_of_point", "start", "order", "occupied", "contents")
 
 
 def _copied(solver):

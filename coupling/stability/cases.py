@@ -35,8 +35,8 @@ def _boxes():
     for value in (2.0, 5.0, 15.0, 30.0):
         yield case(f"psi={value:g}", "dilatancy angle [degree], phi = 25", dilatancy_angle=value)
     for value in (10.0, 25.0):
-        title = "the same, no volumetric smoothing"
-        yield case(f"psi={value:g},no smoothing", title, dilatancy_angle=value, volumetric_smoothing=False)
+        title = "the same, stress not ahead"
+        yield case(f"psi={value:g},damping=0", title, dilatancy_angle=value, stress_damping=0.0)
     yield case("phi=0,c=0", "no strength at all", friction_angle=0.0, cohesion=0.0)
     yield case("phi=50,psi=10", "dilatant", friction_angle=50.0, dilatancy_angle=10.0)
     yield case("phi=50,psi=50", "associated flow at 50 degrees", friction_angle=50.0, dilatancy_angle=50.0)
@@ -67,8 +67,8 @@ def _boxes():
     yield case("filter=1", "full pressure filter", pressure_filter=1.0)
     yield case("pic=0", "pure FLIP", pic_rate=0.0)
     yield case("pic=1e6", "pure PIC", pic_rate=1e6)
-    yield case("no smoothing", "no volumetric smoothing", volumetric_smoothing=False)
-    yield case("no remapping", "strains from the solved velocities (USL)", remapping=False)
+    yield case("damping=0", "stress not ahead", stress_damping=0.0)
+    yield case("damping=2", "stress ahead by two steps", stress_damping=2.0)
     yield case("E=1e+10,K_w=1e+06", "stiff skeleton, soft water", youngs_modulus=1e10, bulk_modulus=1e6)
     yield case("E=1e+05,K_w=1e+11", "soft skeleton, stiff water", youngs_modulus=1e5, bulk_modulus=1e11)
     yield case("size=1mm", "elements of 1 mm", size=1e-3, seconds=0.02)
@@ -101,7 +101,6 @@ def _tunnels():
     for angle in (0.0, 45.0, 180.0):
         yield case(f"gate at {angle:g}", "angle of the gate [degree]", angle=angle)
     yield case("sink", "material taken out behind the gate", interior="sink")
-    yield case("no remapping,gate", "strains from the solved velocities (USL)", remapping=False, seconds=0.1)
     yield case("full", "tunnel filled to the crown, gate open: rest", filled_tunnel, True)
     yield case(
         "filling", "a small tunnel until nothing more fits", gate, diameter=1.0, width=0.2, cover=3.0, seconds=3.0

@@ -11,7 +11,7 @@ class CaseUnknown(SceneError):
     """A name that is no case of `gush stability`."""
 
 
-def stability(names, linear, out, tell):
+def stability(names, linear, out, tell, say=lambda text: None):
     """Run what is asked for.
 
     Parameters
@@ -24,6 +24,8 @@ def stability(names, linear, out, tell):
         Folder to write to.
     tell : callable
         Called with a line of text for every part.
+    say : callable
+        Called with a text about what is being computed.
 
     Returns
     -------
@@ -33,9 +35,10 @@ def stability(names, linear, out, tell):
     chosen = [] if linear else _chosen(names, cases())
     found = None
     if not names:
-        found = critical_map(progress=lambda n, of: tell(f"linear analysis: {n} of {of}") if n % 50 == 0 else None)
+        found = critical_map(progress=lambda n, of: say(f"linear analysis: {n} of {of}"))
     verdicts = []
     for one in chosen:
+        say(f"{one.name}")
         verdicts.append(judge_apart(one))
         tell(f"{one.name}: {verdicts[-1].verdict}, {verdicts[-1].seconds:.1f} s")
     data = summary(found, verdicts)

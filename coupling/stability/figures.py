@@ -2,12 +2,12 @@
 
 import matplotlib
 import numpy as np
-from matplotlib.figure import Figure
 
 from coupling.figures import GATE, NOW, SECOND, STYLE
+from coupling.picture import Picture
 
 PLACES = ("layout", "random", "edges", "vertices")
-SETS = (("spectral", 1, NOW), ("spectral", 0, "0.45"), ("altitude", 1, SECOND), ("altitude", 0, GATE))
+SETS = (("spectral", True, NOW), ("spectral", False, "0.45"), ("altitude", True, SECOND), ("altitude", False, GATE))
 
 
 def critical_courant(linear):
@@ -19,7 +19,7 @@ def critical_courant(linear):
         Of :func:`coupling.stability.linear.critical_map`.
     """
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(8.4, 7.6), layout="constrained")
+        figure = Picture(figsize=(8.4, 7.6), layout="constrained")
         axes = figure.subplots(3, 2)
         moduli, permeability = _family(linear, "moduli"), _family(linear, "permeability")
         moduli = moduli.isel(configuration=np.isfinite(moduli.bulk_modulus.values))
@@ -63,26 +63,24 @@ def _heat(axis, part, way, x, y, x_label, y_label):
 
 def _positions(axis, part):
     rng = np.random.default_rng(0)
-    for offset, (way, smooth, colour) in enumerate(SETS):
-        chosen = part.isel(configuration=(part.volumetric_smoothing == smooth).values)
+    for offset, (way, damped, colour) in enumerate(SETS):
+        chosen = part.isel(configuration=((part.stress_damping > 0) == damped).values)
         at = np.array([PLACES.index(p) for p in chosen.positions.values]) + 0.2 * (offset - 1.5)
         at = at + rng.uniform(-0.06, 0.06, len(at))
-        axis.plot(
-            at, chosen[f"{way}_ratio"], ".", ms=4, color=colour, label=f"{way}{'' if smooth else ', no smoothing'}"
-        )
+        axis.plot(at, chosen[f"{way}_ratio"], ".", ms=4, color=colour, label=_label(way, damped))
     _limits(axis)
     axis.set_xticks(range(len(PLACES)), PLACES)
     axis.set_xlabel("positions of the points")
 
 
 def _shapes(axis, part):
-    for way, smooth, colour in SETS:
+    for way, damped, colour in SETS:
         for place, marker in (("layout", "o"), ("vertices", "^")):
-            chosen = part.isel(configuration=((part.positions == place) & (part.volumetric_smoothing == smooth)).values)
+            chosen = part.isel(configuration=((part.positions == place) & ((part.stress_damping > 0) == damped)).values)
             at = np.array([0.3, 1.0, 3.0]).searchsorted(chosen.aspect) + 0.3 * (chosen["skew"] > 0)
             axis.plot(at, chosen[f"{way}_ratio"], marker, ms=4, color=colour, mfc="none")
-    for way, smooth, colour in SETS:
-        axis.plot([], [], "s", ms=4, color=colour, label=f"{way}{'' if smooth else ', no smoothing'}")
+    for way, damped, colour in SETS:
+        axis.plot([], [], "s", ms=4, color=colour, label=_label(way, damped))
     for place, marker in (("layout", "o"), ("vertices", "^")):
         axis.plot([], [], marker, ms=4, color="0.3", mfc="none", label=f"points: {place}")
     _limits(axis)
@@ -90,6 +88,10 @@ def _shapes(axis, part):
     axis.set_xlabel("width over height of a cell [-]; skew: nodes moved")
     axis.set_ylim(0.0, 2.9)
     axis.legend(loc="upper left", fontsize=5, ncols=3, columnspacing=0.8, handletextpad=0.2)
+
+
+def _label(way, damped):
+    return way if damped else f"{way}, undamped"
 
 
 def _limits(axis):

@@ -5,7 +5,7 @@ from dataclasses import asdict, fields
 
 import numpy as np
 
-from coupling.stability.amplification import Amplification, Column
+from coupling.stability.amplification import DEFAULT, Amplification, Column
 from coupling.stability.extremes import decades
 
 POSITIONS = (
@@ -13,8 +13,9 @@ POSITIONS = (
     *((place, points, seed) for place in ("random", "edges", "vertices") for points in (1, 3, 12) for seed in (0, 1)),
 )
 WAYS = ("altitude", "spectral")
+AHEAD = (DEFAULT.stress_damping, 0.0)
 UNITS = {
-    "bulk_modulus": "Pa", "hydraulic_conductivity": "m s-1", "youngs_modulus": "Pa", "size": "m", "pic_rate": "s-1",
+    "bulk_modulus": "Pa", "hydraulic_conductivity": "m/s", "youngs_modulus": "Pa", "size": "m", "pic_rate": "1/s",
     "altitude": "s", "spectral": "s", "actual": "s",
 }  # fmt: skip
 
@@ -38,28 +39,22 @@ def columns():
                     youngs_modulus=stiffness,
                 ),
             )
-    for (place, points, seed), modulus, smoothing in itertools.product(POSITIONS, (None, 8e7), (True, False)):
-        yield (
-            "positions",
-            Column(positions=place, points=points, seed=seed, bulk_modulus=modulus, volumetric_smoothing=smoothing),
-        )
-    for (place, points, seed), modulus in itertools.product(POSITIONS, (None, 8e7)):
-        yield "no remapping", Column(positions=place, points=points, seed=seed, bulk_modulus=modulus, remapping=False)
-    for modulus, stiffness, smoothing in itertools.product((1e6, 8e7, 2.2e9), (1e5, 4e7, 1e10), (True, False)):
-        yield (
-            "undrained",
-            Column(
-                bulk_modulus=modulus, youngs_modulus=stiffness, volumetric_smoothing=smoothing, drainage="undrained"
-            ),
-        )
+    for (place, points, seed), modulus, ahead in itertools.product(POSITIONS, (None, 8e7), AHEAD):
+        column = Column(positions=place, points=points, seed=seed, bulk_modulus=modulus, stress_damping=ahead)
+        yield "positions", column
+    for modulus, stiffness, ahead in itertools.product((1e6, 8e7, 2.2e9), (1e5, 4e7, 1e10), AHEAD):
+        column = Column(bulk_modulus=modulus, youngs_modulus=stiffness, stress_damping=ahead, drainage="undrained")
+        yield "undrained", column
     shapes = [(aspect, skew, seed) for aspect in (0.3, 1.0, 3.0) for skew, seed in ((0.0, 0), (0.2, 0), (0.2, 1))]
-    for (aspect, skew, seed), place, smoothing in itertools.product(shapes, ("layout", "vertices"), (True, False)):
-        yield "mesh", Column(aspect=aspect, skew=skew, seed=seed, positions=place, volumetric_smoothing=smoothing)
+    for (aspect, skew, seed), place, ahead in itertools.product(shapes, ("layout", "vertices"), AHEAD):
+        yield "mesh", Column(aspect=aspect, skew=skew, seed=seed, positions=place, stress_damping=ahead)
     for ratio in (0.0, 0.2, 0.45, 0.49):
         for modulus in (None, 8e7):
             yield "Poisson", Column(poissons_ratio=ratio, bulk_modulus=modulus)
     for strength, rate in itertools.product((0.0, 0.2, 0.5, 1.0), (0.0, 10.0, 1e4)):
         yield "numerics", Column(pressure_filter=strength, pic_rate=rate)
+    for ahead, conductivity in itertools.product((0.1, 1.0, 2.0), (1e-4, 1e-2, 1.0)):
+        yield "numerics", Column(stress_damping=ahead, hydraulic_conductivity=conductivity)
 
 
 def measure(column):
@@ -116,8 +111,6 @@ def critical_map(chosen=None, progress=None):
         for name in names
         if name not in ("family", "positions", "drainage")
     }
-    for name in ("volumetric_smoothing", "remapping"):
-        data[name] = (data[name][0], data[name][1].astype(np.int8))
     for name in ("family", "positions", "drainage"):
         data[name] = ("configuration", np.array([row[name] for row in rows], dtype=object))
     text = (

@@ -160,10 +160,10 @@ def _reading(linear):
 def _described(part):
     rows = [
         f"{int(p)} points an element at {place}, aspect {a:g}, skew {k:g}, {'wet' if np.isfinite(m) else 'dry'}"
-        f"{'' if s else ', no smoothing'} ({e:.1e})"
+        f"{'' if s else ', undamped'} ({e:.1e})"
         for p, place, a, k, m, s, e in zip(
             *(part[n].values for n in ("points", "positions", "aspect", "skew", "bulk_modulus")),
-            *(part[n].values for n in ("volumetric_smoothing", "excess")),
+            *(part[n].values for n in ("stress_damping", "excess")),
             strict=True,
         )
     ]

@@ -16,13 +16,12 @@ matrix is formed, which is round-off.
 
 READING = """
 - Why the altitude is so far off: velocities return to the nodes through the points, which takes the shortest waves
-  away (in one dimension with a consistent mass: a factor of sqrt(8/3) = 1.63 in the step); mean volume changes soften
-  them; drag locks the water to the grains; and a flat element has neighbours that are not. Points gathered at
-  vertices, flat elements and no smoothing make it worse than the truth. No factor on the altitude can serve: its
-  ratio varies with positions and shapes by more than 1/0.7.
-- Weak growth comes from the pressure filter together with mean volume changes; without either it is gone (trial with
-  one point per element, all within 1e-4 of a vertex). The critical step says nothing about it: it counts from 1 % a
-  step on.
+  away (in one dimension with a consistent mass: a factor of sqrt(8/3) = 1.63 in the step); drag locks the water to the
+  grains; and a flat element has neighbours that are not. Points gathered at vertices, flat elements and stress that
+  runs ahead make it worse than the truth. No factor on the altitude can serve: its ratio varies with positions and
+  shapes by more than 1/0.7.
+- Stress that runs ahead by a share a of a step (`stress_damping`) divides the critical step by sqrt(1 + 2 a). That is
+  exact mode by mode, also with implicit drag: only the real root at -1 leaves the unit circle.
 - PIC makes the critical step up to sqrt(2) smaller than FLIP; the spectral prediction counts it, the altitude's does
   not.
 - The default is "spectral" at a Courant number of 0.8. Estimates are renewed after 5 to 200 steps, soon where the last
@@ -52,15 +51,6 @@ FOUND = """
 
 Numbers of this list are of trials made while this command was written; the table above is of today.
 
-- **Energy from nothing.** With mean volume changes (`volumetric_smoothing`) a dilatant Mohr-Coulomb soil gained
-  energy without limit: a block of dry sand (phi = psi = 25 degrees) threw itself 0.2 m up, with 1600 J/m of kinetic
-  energy where gravity had done less than 1 J/m of work. Stress follows the mean volume change, but the force is that
-  of the element's own stress. For elastic states both belong to one symmetric stiffness; dilatancy loads elements
-  against each other in patterns that the mean does not see, and these do work for ever. Repaired: where a soil
-  dilates, its skeleton is strained by its own element's rates, and any dilatancy up to the friction angle is sound.
-- **Own rates lock coarse channels.** With two elements across the gate a skeleton of own rates (a dilatant soil, or no
-  smoothing) lets nothing in within 0.2 s where 74 kg/m come in with mean rates. Dilatant soil needs a finer mesh at
-  the gate.
 - **No weight.** A scene without gravity divided zero by zero in its relaxation. Repaired. The drag is gravity over
   conductivity, so it vanishes with gravity: a conductivity is that of the scene's gravity.
 - **Corners of the gate.** The corners of an open gate push in one direction only, so a tunnel filled with ground in
@@ -72,9 +62,6 @@ Numbers of this list are of trials made while this command was written; the tabl
   where it had not.
 - **A few points.** One point inside an element resists nothing until it meets a wall; the spectrum called any step
   stable. Beyond four times the step of the altitude the estimate is not believed, and half of that step is taken.
-- **Without remapping** (`remapping = false`) the critical step falls with the mass of the smallest node. Blocks and
-  gates run, with up to eight times the steps; a block that slides along a floor, whose corners touch floor nodes by
-  1e-6 of a point and less, would stand still. Its run ends with that reason.
 - **Steps of their own.** Forces held over the step of a coarse element act late at nodes with finer steps, and fed
   undamped waves; see [numerics.md](numerics.md).
 

@@ -127,7 +127,7 @@ def at_inflow_masses(pressures, history, responses, masses):
             masses / max(masses[-1], 1e-300),
             {"units": "1", "long_name": "share of the last inflow mass"},
         ),
-        inflow_mass=("progress", masses, {"units": "kg m-1", "long_name": "grains inside the tunnel"}),
+        inflow_mass=("progress", masses, {"units": "kg/m", "long_name": "grains inside the tunnel"}),
     )
     result["cpu_seconds"] = (
         (),

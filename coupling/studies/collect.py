@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,11 +13,14 @@ from coupling.netcdf_group import read_group_at_once
 from coupling.provenance import origin, with_history
 from coupling.studies.design import Case, Study, StudyError
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 #: Studies whose cases take less than this on the disk are held in memory.
 MOST_BYTES_IN_MEMORY = 5e8
 
 
-def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, str]):
+def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, str]) -> xr.Dataset:
     """The cases' datasets along a dimension `case`; a large study is loaded when used.
 
     Returns
@@ -147,7 +151,7 @@ def stored_cases(folder: str | Path) -> tuple[Study, list[Case], dict[str, str]]
     return plan, found, {key: message for key, (_, status, message) in entries.items() if status == "failed"}
 
 
-def read_study(folder: str | Path):
+def read_study(folder: str | Path) -> xr.Dataset:
     """The dataset of a study that ran earlier.
 
     Parameters

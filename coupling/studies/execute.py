@@ -7,11 +7,14 @@ import os
 import time as clock
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from coupling.studies.case import CASE_FILE, run_case
 from coupling.studies.design import Case, Study, StudyError, cases, check_backends, load_study
 from coupling.studies.progress import StudyState, watching
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: Times that a case may lose its worker, the last ones with nothing beside it.
 LOSSES = 3
@@ -27,7 +30,7 @@ def study(
     scheduler: str | None = None,
     progress: Callable[[str], None] | None = None,
     watch: Callable[[StudyState], None] | None = None,
-):
+) -> xr.Dataset:
     """Run a study and return its dataset.
 
     Cases that are in `out` already are not run again: each has a folder named after everything that decides its

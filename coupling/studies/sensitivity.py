@@ -153,13 +153,13 @@ def tornado(result, label: str = "", scale: float = 1.0):
     matplotlib.figure.Figure
     """
     import matplotlib
-    from matplotlib.figure import Figure
 
     from coupling.figures import STYLE
+    from coupling.picture import Picture
 
     with matplotlib.rc_context(STYLE):
         names = result["parameter"].values[::-1]
-        figure = Figure(figsize=(5.6, 1.0 + 0.32 * len(names)), layout="constrained")
+        figure = Picture(figsize=(5.6, 1.0 + 0.32 * len(names)), layout="constrained")
         axes = figure.subplots()
         low, high = scale * result["low"].values[::-1], scale * result["high"].values[::-1]
         place = np.arange(len(names))
@@ -191,14 +191,14 @@ def scatter(study, quantity, label: str = "", scale: float = 1.0):
     matplotlib.figure.Figure
     """
     import matplotlib
-    from matplotlib.figure import Figure
 
     from coupling.figures import STYLE
+    from coupling.picture import Picture
 
     names = [str(name) for name in sensitivity(study, quantity)["parameter"].values]
     parameters = parameters_of(study)
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(min(2.4 * len(names) + 0.6, 10), 2.6), layout="constrained")
+        figure = Picture(figsize=(min(2.4 * len(names) + 0.6, 10), 2.6), layout="constrained")
         panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
         for axes, name in zip(panels, names, strict=True):
             values = parameters[name]

@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from coupling.verification.boxes import box_mesh
-from coupling.verification.driven import DrivenSolver, dry_scene
-from coupling.verification.problem import Problem, Result, Stopwatch, register
+from coupling.verification.driven import DrivenSolver, box_scene
+from coupling.verification.problem import NUMERICS, WET, Problem, Result, Stopwatch, register
 from coupling.verification.two_phase import (
     NU,
     POROSITY,
@@ -14,42 +14,30 @@ from coupling.verification.two_phase import (
     constrained_modulus,
     terzaghi_series,
 )
-from mpm.scene import Scene
 from mpm.solver import Solver
 from mpm.variables import MASS, SXX, SYY, SZZ, VLX, VLY, VSX, VSY, X0, Y0, P, Y
 
 
 def column(
-    cells, height, conductivity, bulk_modulus, youngs_modulus=4e7, model="elastic", points=3, drainage="two-phase",
-    **numerics,
+    cells, height, conductivity, bulk_modulus, youngs_modulus=4e7, model="elastic", drainage="two-phase", **numerics,
 ):  # fmt: skip
     """A wet column, two elements wide, drained at its top, and its scene: (scene, mesh).
 
     `cells` elements over `height` [m]; the ground water stands at the top.
     """
     size = height / cells
-    scene = Scene.model_validate({
-        "name": "column", "box": {"width": 2 * size, "depth": height},
-        "water": {"table_depth": 0.0, "density": 1000.0, "bulk_modulus": bulk_modulus, "drainage": drainage},
-        "soils": [{
-            "name": "column", "top_depth": 0.0, "model": model, "youngs_modulus": youngs_modulus,
-            "poissons_ratio": NU, "cohesion": 1e5, "friction_angle": 30.0, "dilatancy_angle": 0.0,
-            "porosity": POROSITY, "loose_porosity": 0.6, "grain_density": 2650.0,
-            "hydraulic_conductivity": conductivity, "k0": 0.5,
-        }],
-        "discretisation": {
-            "element_size": size, "element_size_lining": size, "element_size_interior": size, "gate_radius": size,
-            "points_per_element": points,
-        },
-        "numerics": numerics,
-        "stop": {"time": 1.0}, "output": {"interval": 1.0},
-    })  # fmt: skip
+    soil = {
+        "model": model, "youngs_modulus": youngs_modulus, "poissons_ratio": NU, "cohesion": 1e5, "porosity": POROSITY,
+        "loose_porosity": 0.6, "hydraulic_conductivity": conductivity,
+    }  # fmt: skip
+    water = {"bulk_modulus": bulk_modulus, "drainage": drainage}
+    scene = box_scene("column", size, 2 * size, height, soil, water, **numerics)
     return scene, box_mesh(np.array([-size, 0.0, size]), (np.arange(cells + 2) - cells) * size)
 
 
 def terzaghi(
-    cells=20, conductivity=1e-4, bulk_modulus=8e7, time_factor=0.1, model="elastic", points=3, courant=0.8,
-    pic_rate=10.0, pressure_filter=0.4, inertia=False, drainage="two-phase",
+    cells=20, conductivity=1e-4, bulk_modulus=8e7, time_factor=0.1, inertia=False, drainage="two-phase",
+    **numerics,
 ):  # fmt: skip
     """Let an excess pressure, carried by the water of a column of 1 m, drain through its top until Tv = `time_factor`.
 
@@ -58,10 +46,7 @@ def terzaghi(
     `inertia` against the answer of grains and water that have mass.
     """
     height, initial = 1.0, 1e4
-    scene, mesh = column(
-        cells, height, conductivity, bulk_modulus, model=model, points=points, courant=courant, pic_rate=pic_rate,
-        pressure_filter=pressure_filter, drainage=drainage,
-    )  # fmt: skip
+    scene, mesh = column(cells, height, conductivity, bulk_modulus, drainage=drainage, **numerics)
     solver = Solver(scene, mesh, threads=1)
     hydrostatic = solver.points[:, P].copy()
     solver.points[:, P] += initial
@@ -88,17 +73,15 @@ def terzaghi(
     )  # fmt: skip
 
 
-def oedometer(cells=5, strain=1e-3, duration=0.5, points=3, courant=0.8, pic_rate=10.0):
+def oedometer(cells=5, strain=1e-3, duration=0.5, **numerics):
     """Press the top of a dry elastic column of 1 m down by `strain`, slowly: stresses of its points.
 
     Reference: Hooke's law without lateral strain, sigma_yy = M e, sigma_xx = nu/(1-nu) sigma_yy, with the logarithmic
     strain e, since the rates add up on the deformed column.
     """
     size = 1.0 / cells
-    scene = dry_scene(
-        "oedometer", size, 2 * size, 1.0, {"model": "elastic", "poissons_ratio": NU}, gravity=1e-9, points=points,
-        courant=courant, pic_rate=pic_rate,
-    )  # fmt: skip
+    soil = {"model": "elastic", "poissons_ratio": NU}
+    scene = box_scene("oedometer", size, 2 * size, 1.0, soil, gravity=1e-9, **numerics)
     solver = DrivenSolver(scene, box_mesh([-size, 0.0, size], np.linspace(-1, 0, cells + 1)), damping=0.5)
     solver.points[:, [SXX, SYY, SZZ]] = 0.0
     top = solver.mesh.top
@@ -119,8 +102,7 @@ def oedometer(cells=5, strain=1e-3, duration=0.5, points=3, courant=0.8, pic_rat
 
 
 def hydrostatics(
-    size=0.35, size_growth=0.3, duration=0.05, points=3, courant=0.8, pic_rate=10.0,
-    pressure_filter=0.4, local_time_stepping=True, lining="fixed",
+    size=0.35, size_growth=0.3, duration=0.05, points=3, lining="fixed", **numerics,
 ):  # fmt: skip
     """Ground under K0 and hydrostatic stress around a lining without a gate, left to itself for `duration` [s].
 
@@ -142,10 +124,7 @@ def hydrostatics(
         discretisation={
             "element_size": 3.0, "element_size_lining": size, "size_growth": size_growth, "points_per_element": points,
         },
-        numerics={
-            "courant": courant, "pic_rate": pic_rate,
-            "pressure_filter": pressure_filter, "local_time_stepping": local_time_stepping,
-        },
+        numerics=numerics,
     ).mpm  # fmt: skip
     solver = Solver(scene, build_mesh(scene), threads=1)
     solver.relax()
@@ -181,9 +160,6 @@ def hydrostatics(
 
 
 DRAINAGE = ("two-phase", "undrained")
-NUMERICS = {
-    "points": (1, 3, 12), "courant": (0.2, 0.4, 0.8, 1.0), "pic_rate": (0.0, 10.0, 100.0),
-}  # fmt: skip
 
 register(Problem(
     name="hydrostatics", title="K0 and hydrostatic stress around a closed lining stay as they are",
@@ -191,7 +167,7 @@ register(Problem(
     norm="largest relative error of soil and water pressure on the lining, over all angles", solve=hydrostatics,
     fast={"size": 0.35},
     ladder={
-        "size": (0.175, 0.35, 0.7, 1.4), **NUMERICS, "pressure_filter": (0.0, 0.1, 0.4),
+        "size": (0.175, 0.35, 0.7, 1.4), **NUMERICS, **WET,
         "local_time_stepping": (False, True), "lining": ("fixed", "floating", "elastic"),
     },
     limit=0.004, why="chords of s instead of arcs, s^2 / (8 r^2) = 0.14 %, and a pressure that is linear along them",
@@ -199,7 +175,7 @@ register(Problem(
 
 for bulk_modulus, name in ((8e7, "terzaghi"), (2.2e8, "terzaghi-220-MPa"), (2.2e9, "terzaghi-2200-MPa")):
     physical = {"conductivity": (1e-3, 1e-4, 1e-5), "time_factor": (0.05, 0.1, 0.5)}
-    numerical = {"cells": (5, 10, 20, 40), **NUMERICS, "pressure_filter": (0.0, 0.1, 0.4)}
+    numerical = {"cells": (5, 10, 20, 40), **NUMERICS, **WET}
     register(Problem(
         name=name, title=f"consolidation of a column drained at its top, K_w = {bulk_modulus / 1e6:g} MPa",
         source="Terzaghi (1923) with inertia: two-phase equations, mode by mode",

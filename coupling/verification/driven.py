@@ -72,10 +72,15 @@ class DrivenSolver(Solver):
         row[:, V_DLX : V_DLY + 1] += jump
 
 
-def dry_scene(name, size, width, depth, soil, gravity=9.81, points=3, **numerics):
-    """A dry scene of one soil without a tunnel; `soil` overrides the entries of a cohesionless sand."""
+def box_scene(name, size, width, depth, soil, water=None, gravity=9.81, points=3, **numerics):
+    """A scene of one soil without a tunnel; `soil` overrides the entries of a cohesionless sand, no `water`: dry.
+
+    `points` and `numerics` are what a problem hands through: points an element, and fields of `mpm.scene.Numerics`.
+    """
+    if water is not None:
+        water = {"table_depth": 0.0, "density": 1000.0, **water}
     return Scene.model_validate({
-        "name": name, "gravity": gravity, "box": {"width": width, "depth": depth},
+        "name": name, "gravity": gravity, "box": {"width": width, "depth": depth}, "water": water,
         "soils": [{
             "name": name, "top_depth": 0.0, "model": "mohr-coulomb", "youngs_modulus": 2e7, "poissons_ratio": 0.3,
             "cohesion": 0.0, "friction_angle": 30.0, "dilatancy_angle": 0.0, "porosity": 0.4, "loose_porosity": 0.85,

@@ -3,15 +3,16 @@
 Displacements stay below a sixth of an element, where the first points lie: nodes of the grid are wall and footing.
 """
 
+from functools import partial
+
 import numpy as np
 
 from coupling.verification.boxes import box_mesh
-from coupling.verification.driven import DrivenSolver, dry_scene
-from coupling.verification.problem import Problem, Result, Stopwatch, register
+from coupling.verification.driven import DrivenSolver, box_scene
+from coupling.verification.problem import NUMERICS, Problem, Result, Stopwatch, register
 from mpm.contact import FIXED_X, FIXED_Y
 from mpm.variables import MASS
 
-DAMPING = 0.3  # local damping of the quasi-static loading
 LATE = 0.2  # share of the path at its end over which the load is averaged
 
 
@@ -32,8 +33,8 @@ def load_path(solver, duration, nodes, component, speed):
 
 
 def wall(
-    direction, cells, width, strain, friction_angle, dilatancy_angle, cohesion, rough_base, duration, points, courant,
-    pic_rate,
+    direction, strain, cells=10, width=2.0, friction_angle=30.0, dilatancy_angle=0.0, cohesion=0.0, rough_base=False,
+    duration=0.5, damping=0.0, **numerics,
 ):  # fmt: skip
     """Move a smooth wall of 1 m height away from (-1) or into (1) the soil.
 
@@ -46,43 +47,18 @@ def wall(
         "friction_angle": friction_angle, "dilatancy_angle": dilatancy_angle, "cohesion": cohesion,
         "tensile_strength": 1e8, "youngs_modulus": 1e8,
     }  # fmt: skip
-    scene = dry_scene(
-        "wall", size, columns * size, 1.0, soil, points=points, courant=courant, pic_rate=pic_rate,
-    )  # fmt: skip
-    solver = DrivenSolver(scene, mesh, damping=DAMPING)
+    solver = DrivenSolver(box_scene("wall", size, columns * size, 1.0, soil, **numerics), mesh, damping)
     bottom = np.abs(mesh.nodes[:, 1] + 1.0) < 1e-9
     solver.fixed[bottom] |= (FIXED_X | FIXED_Y) if rough_base else FIXED_Y
     solver.fixed[mesh.left] &= ~FIXED_X
     load, trend, seconds = load_path(solver, duration, mesh.left, 0, direction * strain * width / duration)
     coefficient = np.tan(np.pi / 4 + direction * np.radians(friction_angle) / 2) ** 2
-    geostatic = 0.5 * scene.gravity * solver.points[:, MASS].sum() / (columns * size)
+    geostatic = 0.5 * solver.scene.gravity * solver.points[:, MASS].sum() / (columns * size)
     exact = coefficient * geostatic + direction * 2 * cohesion * np.sqrt(coefficient)
     return Result(
         error=float(abs(load / exact - 1)),
         values={"coefficient": float(load / geostatic), "exact": float(exact / geostatic), "trend": float(trend)},
         steps=solver.step_count, points=solver.n_points, cpu_seconds=seconds,
-    )  # fmt: skip
-
-
-def active_wall(
-    cells=10, width=2.0, strain=4e-4, friction_angle=30.0, dilatancy_angle=0.0, cohesion=0.0, rough_base=False,
-    duration=0.5, points=3, courant=0.8, pic_rate=10.0,
-):  # fmt: skip
-    """Active thrust."""
-    return wall(
-        -1, cells, width, strain, friction_angle, dilatancy_angle, cohesion, rough_base, duration, points, courant,
-        pic_rate,
-    )  # fmt: skip
-
-
-def passive_wall(
-    cells=10, width=2.0, strain=1.5e-3, friction_angle=30.0, dilatancy_angle=0.0, cohesion=0.0, rough_base=False,
-    duration=0.5, points=3, courant=0.8, pic_rate=10.0,
-):  # fmt: skip
-    """Passive resistance."""
-    return wall(
-        1, cells, width, strain, friction_angle, dilatancy_angle, cohesion, rough_base, duration, points, courant,
-        pic_rate,
     )  # fmt: skip
 
 
@@ -95,8 +71,8 @@ def bearing_capacity_factor(friction_angle):
 
 
 def footing(
-    cells=8, friction_angle=0.0, rough=True, settlement=0.0025, stiffness=20000.0, duration=0.25, points=3, courant=0.8,
-    pic_rate=10.0,
+    cells=8, friction_angle=0.0, rough=True, settlement=0.0025, stiffness=20000.0, duration=0.25, damping=0.0,
+    **numerics,
 ):  # fmt: skip
     """Press half a strip footing into weightless soil: `cells` elements, 1 m, and half an element.
 
@@ -113,10 +89,7 @@ def footing(
         "cohesion": cohesion, "friction_angle": friction_angle, "dilatancy_angle": friction_angle,
         "tensile_strength": 1e8, "youngs_modulus": stiffness * cohesion * exact / (2 + np.pi), "k0": 1.0,
     }  # fmt: skip
-    scene = dry_scene(
-        "footing", size, width, depth, soil, gravity=0.0, points=points, courant=courant, pic_rate=pic_rate,
-    )  # fmt: skip
-    solver = DrivenSolver(scene, mesh, damping=DAMPING)
+    solver = DrivenSolver(box_scene("footing", size, width, depth, soil, gravity=0.0, **numerics), mesh, damping)
     under = np.flatnonzero((np.abs(mesh.nodes[:, 1]) < 1e-9) & (mesh.nodes[:, 0] < 1 + 1e-9))
     solver.driven[under, 0] = rough
     load, trend, seconds = load_path(solver, duration * spiral, under, 1, -settlement / (duration * spiral))
@@ -132,8 +105,7 @@ def footing(
 
 
 WALL_LADDER = {
-    "cells": (5, 10, 20), "courant": (0.4, 0.8, 1.0), "points": (1, 3, 12), "pic_rate": (0.0, 10.0, 100.0),
-    "friction_angle": (20.0, 30.0, 40.0),
+    "cells": (5, 10, 20), **NUMERICS, "damping": (0.0, 0.3, 0.8), "friction_angle": (20.0, 30.0, 40.0),
     "dilatancy_angle": (0.0, 10.0, 30.0),
     "cohesion": (0.0, 2e3), "rough_base": (False, True),
 }  # fmt: skip
@@ -141,14 +113,14 @@ WALL_NORM = "thrust over Rankine's less 1, mean over the last fifth of the path"
 
 register(Problem(
     name="active-wall", title="active thrust on a smooth wall that gives way", source="Rankine (1857), active state",
-    norm=WALL_NORM, solve=active_wall, fast={"cells": 10}, ladder=WALL_LADDER, limit=0.02,
+    norm=WALL_NORM, solve=partial(wall, -1, strain=4e-4), fast={"cells": 10}, ladder=WALL_LADDER, limit=0.02,
     why="uniform in x and linear in y, which linear triangles hold: 0.1 % with associated flow; without dilatancy "
     "strain localises, the more the finer the mesh (1.5 % with 20 cells)",
 ))  # fmt: skip
 
 register(Problem(
     name="passive-wall", title="passive resistance of soil to a smooth wall", source="Rankine (1857), passive state",
-    norm=WALL_NORM, solve=passive_wall, fast={"cells": 10}, ladder=WALL_LADDER, limit=0.02,
+    norm=WALL_NORM, solve=partial(wall, 1, strain=1.5e-3), fast={"cells": 10}, ladder=WALL_LADDER, limit=0.02,
     why="uniform in x and linear in y, which linear triangles hold: 0.1 % with associated flow; without dilatancy "
     "strain localises, the more the finer the mesh (1.5 % with 20 cells)",
 ))  # fmt: skip
@@ -158,8 +130,7 @@ register(Problem(
     source="Prandtl (1920): N_c = 2 + pi", norm="N_c over 2 + pi less 1, mean over the last fifth of the path",
     solve=footing, fast={"cells": 8},
     ladder={
-        "cells": (2, 4, 8, 16), "courant": (0.4, 0.8, 1.0), "points": (1, 3, 12), "pic_rate": (0.0, 10.0, 100.0),
-        "rough": (False, True),
+        "cells": (2, 4, 8, 16), **NUMERICS, "damping": (0.0, 0.3, 0.8), "rough": (False, True),
         "friction_angle": (0.0, 10.0, 20.0), "stiffness": (10000.0, 20000.0, 40000.0),
     },
     limit=0.05,

@@ -6,23 +6,18 @@ import numpy as np
 
 from coupling.verification.boxes import box_mesh
 from coupling.verification.columns import column
-from coupling.verification.driven import DrivenSolver, dry_scene
-from coupling.verification.problem import Problem, Result, Stopwatch, register
+from coupling.verification.driven import DrivenSolver, box_scene
+from coupling.verification.problem import NUMERICS, WET, Problem, Result, Stopwatch, register
 from mpm.solver import Solver
 from mpm.variables import MASS, SXX, SXY, SYY, SZZ, VLX, VLY, VSX, VSY, X0, Y0, P, X, Y
 
 
-def free_fall(
-    cells=10, duration=0.5, points=3, courant=0.8, pic_rate=10.0, pressure_filter=0.4,
-):  # fmt: skip
+def free_fall(cells=10, duration=0.5, **numerics):
     """Throw a block of soil and water, `cells` elements a metre, free of stress: it flies as a stone does.
 
     Reference: x0 + v t - g t^2 / 2, and no stress at all.
     """
-    scene, _ = column(
-        cells, 1.0, 1e-4, 8e7, model="mohr-coulomb", points=points, courant=courant, pic_rate=pic_rate,
-        pressure_filter=pressure_filter,
-    )  # fmt: skip
+    scene, _ = column(cells, 1.0, 1e-4, 8e7, model="mohr-coulomb", **numerics)
     size = 1.0 / cells
     x, y = np.arange(-cells, 4 * cells + 1) * size, np.arange(-3 * cells, 3 * cells + 1) * size
     mesh = box_mesh(x, y, lambda x, y: (np.abs(x) < 0.3) & (np.abs(y + 0.5) < 0.3))
@@ -44,9 +39,7 @@ def free_fall(
     )  # fmt: skip
 
 
-def sliding_block(
-    cells=5, slope=30.0, friction=0.2, duration=0.5, points=3, courant=0.8, pic_rate=10.0,
-):  # fmt: skip
+def sliding_block(cells=5, slope=30.0, friction=0.2, duration=0.5, **numerics):
     """An elastic block, 1 m long and 0.4 m high, `cells` elements a metre, slides down an incline from rest.
 
     Reference: Coulomb, x = (sin a - mu cos a) g t^2 / 2. It begins with the stresses of a long sliding slab.
@@ -56,9 +49,7 @@ def sliding_block(
     angle = math.radians(slope)
     along, normal = np.array([math.cos(angle), -math.sin(angle)]), np.array([math.sin(angle), math.cos(angle)])
     soil = {"model": "elastic", "youngs_modulus": 1e7, "k0": 0.5}
-    scene = dry_scene(
-        "block", size, 3.0, 3.0, soil, gravity=gravity, points=points, courant=courant, pic_rate=pic_rate,
-    )  # fmt: skip
+    scene = box_scene("block", size, 3.0, 3.0, soil, gravity=gravity, **numerics)
     mesh = box_mesh(
         np.arange(columns + 1) * size, np.arange(rows + 1) * size, lambda x, y: (x < 1) & (y < height),
         fixed_bottom=False,
@@ -93,13 +84,13 @@ def sliding_block(
     )  # fmt: skip
 
 
-def rotation(cells=10, turn=90.0, steps=400, points=3, pic_rate=0.0):
+def rotation(cells=10, turn=90.0, steps=400, **numerics):
     """Turn a block under stress rigidly by `turn` degrees in `steps` steps: its stress turns with it.
 
     Reference: sigma(t) = R sigma R^T (objectivity).
     """
     size = 1.0 / cells
-    scene = dry_scene("turn", size, 4.0, 4.0, {"model": "elastic"}, gravity=1e-9, points=points, pic_rate=pic_rate)
+    scene = box_scene("turn", size, 4.0, 4.0, {"model": "elastic"}, gravity=1e-9, **numerics)
     line = np.arange(-2 * cells, 2 * cells + 1) * size
     mesh = box_mesh(line, line, lambda x, y: np.hypot(x, y) < 0.8, fixed_bottom=False)
     mesh.left = mesh.right = np.zeros(0, np.int32)
@@ -125,14 +116,10 @@ def rotation(cells=10, turn=90.0, steps=400, points=3, pic_rate=0.0):
     )  # fmt: skip
 
 
-NUMERICS = {
-    "points": (1, 3, 12), "courant": (0.2, 0.4, 0.8, 1.0), "pic_rate": (0.0, 10.0, 100.0),
-}  # fmt: skip
-
 register(Problem(
     name="free-fall", title="a block of soil and water in flight", source="Galilei: x0 + v t - g t^2 / 2",
     norm="largest error of a point's way over the way", solve=free_fall, fast={"cells": 10},
-    ladder={"cells": (5, 10, 20), **NUMERICS, "pressure_filter": (0.0, 0.4)},
+    ladder={"cells": (5, 10, 20), **NUMERICS, **WET},
     limit=2e-3, why="positions move with the velocity at the end of a step: g t dt / 2 over the way",
 ))  # fmt: skip
 

@@ -3,11 +3,10 @@
 import numpy as np
 
 from coupling.verification.boxes import annulus_mesh, box_mesh
-from coupling.verification.driven import DrivenSolver, dry_scene
-from coupling.verification.earth_pressure import DAMPING, load_path
-from coupling.verification.problem import Problem, Result, Stopwatch, register
+from coupling.verification.driven import DrivenSolver, box_scene
+from coupling.verification.earth_pressure import load_path
+from coupling.verification.problem import NUMERICS, WET, Problem, Result, Stopwatch, register
 from mpm.contact import FIXED_X, FIXED_Y
-from mpm.scene import Scene
 from mpm.solver import Solver
 from mpm.variables import MASS, S_DRAG, SXX, SXY, SYY, SZZ, P, X, Y
 
@@ -42,8 +41,8 @@ def salencon(pressure, initial, cohesion, friction_angle, dilatancy_angle, young
 
 
 def cavity(
-    sectors=10, outer=20.0, friction_angle=30.0, dilatancy_angle=0.0, cohesion=0.1, release=0.9, duration=0.6, points=3,
-    courant=0.8, pic_rate=10.0,
+    sectors=10, outer=20.0, friction_angle=30.0, dilatancy_angle=0.0, cohesion=0.1, release=0.9, duration=0.6,
+    damping=0.3, **numerics,
 ):  # fmt: skip
     """Let the wall of a cavity of 1 m radius move inwards until the share `release` of the initial pressure is gone.
 
@@ -55,10 +54,7 @@ def cavity(
         "youngs_modulus": modulus, "poissons_ratio": nu, "cohesion": cohesion * initial, "tensile_strength": 0.0,
         "friction_angle": friction_angle, "dilatancy_angle": dilatancy_angle, "k0": 1.0,
     }  # fmt: skip
-    scene = dry_scene(
-        "cavity", 1.0, 2 * outer, outer, soil, gravity=0.0, points=points, courant=courant, pic_rate=pic_rate,
-    )  # fmt: skip
-    solver = DrivenSolver(scene, mesh, damping=DAMPING)
+    solver = DrivenSolver(box_scene("cavity", 1.0, 2 * outer, outer, soil, gravity=0.0, **numerics), mesh, damping)
     solver.points[:, [SXX, SYY, SZZ]] = -initial
     solver.fixed[mesh.on_axis] |= FIXED_Y
     solver.fixed[mesh.outer] |= FIXED_X | FIXED_Y
@@ -93,9 +89,7 @@ def cavity(
     )  # fmt: skip
 
 
-def seepage(
-    sectors=10, outer=6.0, conductivity=0.05, duration=1.2, points=3, courant=0.8, pic_rate=10.0, pressure_filter=0.4,
-):  # fmt: skip
+def seepage(sectors=10, outer=6.0, conductivity=0.05, duration=1.2, **numerics):
     """Water that enters evenly at the outer arc flows to a cavity of 1 m radius: steady excess pressure.
 
     Reference: Darcy in a ring, p = p_outer ln(r) / ln(outer), Thiem (1906). The pressure needs a time to become steady
@@ -103,24 +97,12 @@ def seepage(
     """
     high, density, gravity, porosity = 1e4, 1000.0, 9.81, 0.4
     mesh = annulus_mesh(ring_radii(outer, sectors), sectors)
-    scene = Scene.model_validate({
-        "name": "seepage", "gravity": 0.0, "box": {"width": 2 * outer, "depth": outer + 1},
-        "water": {"table_depth": 0.0, "density": density, "bulk_modulus": 1e7},
-        "soils": [{
-            "name": "sand", "top_depth": 0.0, "model": "elastic", "youngs_modulus": 1e7, "poissons_ratio": 0.3,
-            "cohesion": 0.0, "friction_angle": 30.0, "dilatancy_angle": 0.0, "porosity": porosity,
-            "loose_porosity": 0.6, "grain_density": 2650.0, "hydraulic_conductivity": conductivity, "k0": 0.5,
-        }],
-        "discretisation": {
-            "element_size": 1.0, "element_size_lining": 1.0, "element_size_interior": 1.0, "gate_radius": 1.0,
-            "points_per_element": points,
-        },
-        "numerics": {
-            "courant": courant, "pic_rate": pic_rate,
-            "pressure_filter": pressure_filter,
-        },
-        "stop": {"time": 1.0}, "output": {"interval": 1.0},
-    })  # fmt: skip
+    soil = {
+        "model": "elastic", "youngs_modulus": 1e7, "porosity": porosity, "loose_porosity": 0.6,
+        "hydraulic_conductivity": conductivity,
+    }  # fmt: skip
+    water = {"density": density, "bulk_modulus": 1e7}
+    scene = box_scene("seepage", 1.0, 2 * outer, outer + 1, soil, water, gravity=0.0, **numerics)
     solver = DrivenSolver(scene, mesh)
     solver.soils[:, S_DRAG] = gravity / conductivity  # the weightless scene has none
     solver.points[:, [SXX, SYY, SZZ, SXY, P]] = 0.0
@@ -149,8 +131,7 @@ def seepage(
 
 
 def trapdoor(
-    cells=8, cover=2.0, friction_angle=30.0, settlement=0.01, duration=1.0, points=3, courant=0.8,
-    pic_rate=10.0,
+    cells=8, cover=2.0, friction_angle=30.0, settlement=0.01, duration=1.0, damping=0.3, **numerics,
 ):  # fmt: skip
     """Lower a trapdoor of half width 1 m and half an element under `cover` m of sand; load on it over its weight.
 
@@ -160,17 +141,14 @@ def trapdoor(
     size = 1.0 / cells
     mesh = box_mesh(np.arange(4 * cells + 1) * size, np.arange(-round(cover * cells), 3) * size)
     soil = {"youngs_modulus": 5e7, "friction_angle": friction_angle}
-    scene = dry_scene(
-        "trapdoor", size, 4.0, cover, soil, points=points, courant=courant, pic_rate=pic_rate,
-    )  # fmt: skip
-    solver = DrivenSolver(scene, mesh, damping=DAMPING)
+    solver = DrivenSolver(box_scene("trapdoor", size, 4.0, cover, soil, **numerics), mesh, damping)
     door = mesh.bottom[mesh.nodes[mesh.bottom, 0] < 1 + 1e-9]
     solver.fixed[door] &= ~FIXED_Y
     load, trend, seconds = load_path(solver, duration, door, 1, -settlement / duration)
     half_width = 1 + size / 2
     friction = 2 * np.sin(np.radians(friction_angle)) * cover / (2 * half_width)
     exact = (1 - np.exp(-friction)) / friction
-    ratio = load / (half_width * scene.gravity * solver.points[:, MASS].sum() / 4.0)
+    ratio = load / (half_width * solver.scene.gravity * solver.points[:, MASS].sum() / 4.0)
     return Result(
         error=float(abs(ratio / exact - 1)),
         values={"load_over_weight": float(ratio), "exact": float(exact), "trend": float(trend)},
@@ -179,7 +157,7 @@ def trapdoor(
 
 
 def slot(
-    cells=8, height=3.0, friction_angle=30.0, stiffness=300.0, times=(0.4, 1.0), points=3, courant=0.8, pic_rate=10.0,
+    cells=8, height=3.0, friction_angle=30.0, stiffness=300.0, times=(0.4, 1.0), **numerics,
 ):  # fmt: skip
     """Sand of the given height above a slot of 1 m, `cells` elements, in a floor: its steady outflow.
 
@@ -197,9 +175,7 @@ def slot(
         "friction_angle": friction_angle, "loose_porosity": 0.5,
         "youngs_modulus": stiffness * 0.6 * 2650.0 * gravity * height,
     }  # fmt: skip
-    scene = dry_scene(
-        "slot", size, width, height + 1.5, soil, points=points, courant=courant, pic_rate=pic_rate,
-    )  # fmt: skip
+    scene = box_scene("slot", size, width, height + 1.5, soil, **numerics)
     solver = Solver(scene, mesh, threads=1)
     floor = (np.abs(mesh.nodes[:, 1] + height) < 1e-9) & (mesh.nodes[:, 0] > 0.5 - 1e-9)
     solver.fixed[floor] |= FIXED_X | FIXED_Y
@@ -219,17 +195,13 @@ def slot(
     )  # fmt: skip
 
 
-NUMERICS = {
-    "courant": (0.4, 0.8, 1.0), "pic_rate": (0.0, 10.0, 100.0),
-}  # fmt: skip
-
 register(Problem(
     name="cavity", title="ground reaction curve of a cylindrical cavity in Mohr-Coulomb soil",
     source="Salencon (1969), Annales des Ponts et Chaussees 4",
     norm="largest difference of the pressure at equal closure over the initial pressure", solve=cavity,
     fast={"sectors": 10},
     ladder={
-        "sectors": (5, 10, 20), "points": (1, 3, 12), **NUMERICS, "friction_angle": (20.0, 30.0, 40.0),
+        "sectors": (5, 10, 20), **NUMERICS, "friction_angle": (20.0, 30.0, 40.0),
         "dilatancy_angle": (0.0, 10.0, 30.0), "cohesion": (0.02, 0.1, 0.3), "outer": (10.0, 20.0, 40.0),
     },
     limit=0.03, why="an element at the wall is 0.16 of the radius; error 1.7 % with 10, 0.7 % with 20 sectors",
@@ -240,8 +212,7 @@ register(Problem(
     norm="root mean square of the pressure error over the pressure at the outer arc", solve=seepage,
     fast={"sectors": 10},
     ladder={
-        "sectors": (5, 10, 20), "points": (1, 3, 12), **NUMERICS, "pressure_filter": (0.0, 0.1, 0.4),
-        "conductivity": (0.025, 0.05, 0.1),
+        "sectors": (5, 10, 20), **NUMERICS, **WET, "conductivity": (0.025, 0.05, 0.1),
     },
     limit=0.01, why="linear pressure in elements of 0.16 of the radius: p'' h^2 / 8 is 0.3 % of p at the wall",
 ))  # fmt: skip
@@ -251,7 +222,7 @@ register(Problem(
     source="Terzaghi (1943), Theoretical Soil Mechanics; friction on the slip plane after Davis (1968)",
     norm="load over its reference less 1, mean over the last fifth of the path", solve=trapdoor, fast={"cells": 8},
     ladder={
-        "cells": (4, 8, 16), "points": (1, 3, 12), **NUMERICS, "friction_angle": (20.0, 30.0, 40.0),
+        "cells": (4, 8, 16), **NUMERICS, "friction_angle": (20.0, 30.0, 40.0),
         "cover": (1.0, 2.0, 4.0),
     },
     limit=0.15, why="the reference is a slice theory: stress even across the door, slip planes straight",
@@ -262,7 +233,7 @@ register(Problem(
     source="Beverloo's law in the plane; Nedderman (1992), Statics and Kinematics of Granular Materials, ch. 10",
     norm="coefficient of rho sqrt(g) W^(3/2) over 1.03 less 1", solve=slot, fast={"cells": 8},
     ladder={
-        "cells": (4, 8, 16), "points": (1, 3, 12), **NUMERICS, "friction_angle": (20.0, 30.0, 40.0),
+        "cells": (4, 8, 16), **NUMERICS, "friction_angle": (20.0, 30.0, 40.0),
         "height": (2.0, 3.0, 4.0),
     },
     limit=0.25,

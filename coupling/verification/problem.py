@@ -11,6 +11,14 @@ from typing import Any
 #: Modules of this package that register problems when they are imported.
 FAMILIES = ("columns", "waves", "motion", "conservation", "plasticity", "flows", "earth_pressure", "openings")
 
+#: Numerical choices that a problem hands through to its scene, and the values that its ladder goes through.
+NUMERICS = {
+    "points": (1, 3, 12), "courant": (0.4, 0.8, 1.0), "pic_rate": (0.0, 1.0, 10.0, 100.0),
+    "stress_damping": (0.0, 0.25, 1.0),
+}  # fmt: skip
+#: The same of pore water.
+WET = {"pressure_filter": (0.0, 0.1, 0.4, 0.8)}
+
 _REGISTRY: dict[str, Problem] = {}
 
 

@@ -7,8 +7,8 @@ import numpy as np
 from coupling.stability.monitor import kinetic_energy, strain_energy
 from coupling.verification.boxes import box_mesh
 from coupling.verification.columns import DRAINAGE, column
-from coupling.verification.driven import dry_scene
-from coupling.verification.problem import Problem, Result, Stopwatch, register
+from coupling.verification.driven import box_scene
+from coupling.verification.problem import NUMERICS, WET, Problem, Result, Stopwatch, register
 from coupling.verification.two_phase import YOUNG, exact_velocities, modes
 from mpm.solver import Solver
 from mpm.variables import SXX, SYY, SZZ, VLY, VSY, P, Y
@@ -17,18 +17,15 @@ HEIGHT = 10.0  # [m]
 
 
 def two_phase_wave(
-    cells=20, conductivity=1.0, bulk_modulus=8e7, mode="fast", periods=2.0, points=3, courant=0.8, pic_rate=0.0,
-    pressure_filter=0.4, drainage="two-phase",
+    cells=20, conductivity=1.0, bulk_modulus=8e7, mode="fast", periods=2.0, drainage="two-phase",
+    **numerics,
 ):  # fmt: skip
     """Quarter of a standing wave in a column of 10 m, fixed at the bottom, free at the top, under its own weight.
 
     mode : "fast", "slow" or "together" (grains and water start with one velocity); periods : of the undamped wave, with
     "together" of the fast one. The amplitude is so small that no pressure becomes negative near the free surface.
     """
-    scene, mesh = column(
-        cells, HEIGHT, conductivity, bulk_modulus, YOUNG, points=points, courant=courant, pic_rate=pic_rate,
-        pressure_filter=pressure_filter, drainage=drainage,
-    )  # fmt: skip
+    scene, mesh = column(cells, HEIGHT, conductivity, bulk_modulus, YOUNG, drainage=drainage, **numerics)
     solver = Solver(scene, mesh, threads=1)
     speeds, shapes = modes(bulk_modulus)
     shape = np.ones(2) if mode == "together" else shapes[1 if mode == "fast" else 0]
@@ -66,16 +63,14 @@ def zero_crossings(times, values):
     return times[k] - values[k] * (times[k + 1] - times[k]) / (values[k + 1] - values[k])
 
 
-def bar(cells=20, periods=5.0, points=3, courant=0.8, pic_rate=0.0):
+def bar(cells=20, periods=5.0, **numerics):
     """A bar without lateral strain, fixed at one end, swings in its lowest mode: velocity and energy.
 
     Reference: omega = pi c / (2 L), c^2 = E / rho; the sum of kinetic and strain energy is constant.
     """
     size, length = 1.0 / cells, 1.0
-    scene = dry_scene(
-        "bar", size, 2 * size, length, {"model": "elastic", "poissons_ratio": 0.0}, gravity=1e-9, points=points,
-        courant=courant, pic_rate=pic_rate,
-    )  # fmt: skip
+    soil = {"model": "elastic", "poissons_ratio": 0.0}
+    scene = box_scene("bar", size, 2 * size, length, soil, gravity=1e-9, **numerics)
     solver = Solver(scene, box_mesh([-size, 0.0, size], np.linspace(-1, 0, cells + 1)), threads=1)
     solver.points[:, [SXX, SYY, SZZ, P]] = 0.0
     soil = scene.soils[0]
@@ -106,10 +101,7 @@ def bar(cells=20, periods=5.0, points=3, courant=0.8, pic_rate=0.0):
     )  # fmt: skip
 
 
-NUMERICS = {
-    "points": (1, 3, 12), "courant": (0.2, 0.4, 0.8, 1.0), "pic_rate": (0.0, 10.0, 100.0),
-}  # fmt: skip
-WET = {"cells": (5, 10, 20, 40), **NUMERICS, "pressure_filter": (0.0, 0.1, 0.4), "bulk_modulus": (8e7, 2.2e9)}
+LADDER = {"cells": (5, 10, 20, 40), **NUMERICS, **WET, "bulk_modulus": (8e7, 2.2e9)}
 TOO_SLOW = "phase after two periods: 20 linear elements a quarter wave are 0.2 % too slow"
 NORM = "root mean square, over phases and time, of the amplitude's error over the initial amplitude"
 SOURCE = "matrix exponential of the two-phase equations of a standing wave (Xie et al., Eqs. 1 and 2)"
@@ -133,5 +125,5 @@ for name, title, fast, limit, why in (
 ):  # fmt: skip
     register(Problem(
         name=name, title=title, source=SOURCE, norm=NORM, solve=two_phase_wave, fast={"cells": 20, **fast},
-        ladder=WET | ({"drainage": DRAINAGE} if name == "undrained-wave" else {}), limit=limit, why=why,
+        ladder=LADDER | ({"drainage": DRAINAGE} if name == "undrained-wave" else {}), limit=limit, why=why,
     ))  # fmt: skip

@@ -1,0 +1,41 @@
+"""What `plan` foretells is what a run then does."""
+
+import pytest
+from small_event import COARSE, small_scene
+
+import coupling
+import mpm.solver
+from coupling.datasets import read_history
+from coupling.plan import plan, rough_plan
+
+
+@pytest.mark.parametrize("intervals", [1, 4, 10])
+def test_planned_steps_are_those_that_are_run(tmp_path, intervals):
+    """Steps are cut so that each output interval takes a whole number of them, in powers of two of the levels."""
+    stop = {"time": 0.027, "inflow_mass": 1e9}
+    scene = small_scene(gate="none", stop=stop, output={"interval": 0.027 / intervals})
+    planned = plan(scene, threads=1)
+    coupling.run(scene, tmp_path / "run", threads=1)
+    history = read_history(tmp_path / "run").isel(time=-1)
+    # nothing flows without a gate, so that the critical step stays that of the first state
+    assert planned["expected_steps"] == int(history["steps"])
+    assert planned["expected_point_steps"] == int(history["point_steps"])
+    assert planned["steps_at_most"] == planned["expected_steps"] and planned["records"] == 1 + intervals
+    assert planned["expected_seconds"] == planned["expected_point_steps"] / planned["point_steps_per_second"]
+
+
+def test_plan_tells_the_threads_and_why_it_is_one_with_and_without_a_mesh(monkeypatch):
+    monkeypatch.setattr(mpm.solver, "cores", lambda: 2)
+
+    def threads(found):
+        (row,) = (row for row in found["features"] if row["feature"] == "several threads")
+        return row["active"], row["reason"]
+
+    small = coupling.load_scene("quick", discretisation=COARSE)
+    for found in (plan(small), rough_plan(small)):
+        active, reason = threads(found)
+        assert not active and reason.endswith("elements, a second thread pays from 4000")
+    assert threads(rough_plan("quick")) == (True, "2 threads")
+    assert threads(rough_plan("quick", threads=1)) == (False, "one was asked for")
+    monkeypatch.setattr(mpm.solver, "cores", lambda: 1)
+    assert threads(rough_plan("quick")) == (False, "one core")
