@@ -10,6 +10,8 @@ from mpm.errors import COMPARED
 from mpm.variables import CLAMPS
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import xarray as xr
 
 
@@ -33,11 +35,11 @@ class Judged(NamedTuple):
     fair: float
     remedy: str
 
-    def verdict(self, value):
+    def verdict(self, value: float) -> str:
         """'good', 'fair' or 'poor'; what is no number is poor."""
         return "good" if value <= self.good else "fair" if value <= self.fair else "poor"
 
-    def text(self, value):
+    def text(self, value: float) -> str:
         """The value as people read it, with what it is a share of."""
         return f"{self.form.format(value)} {self.of}".strip()
 
@@ -109,25 +111,25 @@ def quality(history: xr.Dataset, response: xr.Dataset | None = None) -> dict[str
     return result
 
 
-def verdicts(values):
+def verdicts(values: Mapping[str, Any]) -> dict[str, str]:
     """'good', 'fair' or 'poor' for each error of :func:`quality`."""
     return {name: judged.verdict(values[name]) for name, judged in ERRORS.items() if name in values}
 
 
-def quality_line(values: dict[str, Any]) -> str:
+def quality_line(values: Mapping[str, Any]) -> str:
     """The errors of :func:`quality` with their verdicts in one line for people."""
     found = verdicts(values)
     return ", ".join(f"{ERRORS[name].label} {ERRORS[name].text(values[name])} ({found[name]})" for name in found)
 
 
-def states_line(values):
+def states_line(values: Mapping[str, Any]) -> str:
     """The states and limits that points met, which are no errors, in one line for people."""
     points = {clamp: f"{values[name]:.1%} of points, " for name, clamp in STATES.items() if name in values}
     met = {name: share for name, share in values["clamps"].items() if share > 0}
     return "; ".join(f"{CLAMPS[name]} {points.get(name, '')}{share:.2%} of point-steps" for name, share in met.items())
 
 
-def poor_errors(values):
+def poor_errors(values: Mapping[str, Any]) -> list[str]:
     """What a reader must know before believing the run, one sentence an error that is poor, with its remedy."""
     told = []
     for name, verdict in verdicts(values).items():
@@ -138,7 +140,7 @@ def poor_errors(values):
     return told
 
 
-def stored_quality(attributes):
+def stored_quality(attributes: Mapping[str, Any]) -> dict[str, float]:
     """The errors among the attributes of a run file: name to value."""
     names = (name for name in ERRORS if f"quality_{name}" in attributes)
     return {name: float(attributes[f"quality_{name}"]) for name in names}

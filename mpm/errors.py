@@ -1,5 +1,12 @@
 """Errors of a run, each over what it is an error of: the largest departure so far over the largest amount so far."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
 #: Error [-]: departure and the amounts that it is compared with, of :meth:`mpm.Solver.balances`; of several amounts the
 #: first that is not zero.
 COMPARED = {
@@ -11,13 +18,13 @@ COMPARED = {
 }
 
 
-def largest_so_far(largest, balances):
+def largest_so_far(largest: Mapping[str, float], balances: Mapping[str, float]) -> dict[str, float]:
     """Largest sizes of all departures and amounts, those before, `largest` (may be empty), included: a new dict."""
     names = {name for departure, amounts in COMPARED.values() for name in (departure, *amounts)}
     return {name: max(abs(balances[name]), largest.get(name, 0.0)) for name in sorted(names)}
 
 
-def errors(largest):
+def errors(largest: Mapping[str, float]) -> dict[str, float]:
     """Errors of what `largest_so_far` gave.
 
     Both are the largest so far, since they pass their peaks at different times: a jet that has come to rest keeps the
