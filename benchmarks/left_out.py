@@ -150,8 +150,8 @@ def main():
         "",
         f"Frictionless linings compile nothing away: {contacts} of {nodes} nodes touch a lining, and what they cost is "
         'in the noise. Drag is implicit, so tight ground takes the time step of sand and `drainage = "undrained"` '
-        "changes only the work of a step. A dry scene keeps the water's columns: a point is two cache lines, whatever it "
-        "holds.",
+        "changes only the work of a step. A dry scene keeps the water's columns: a point is two cache lines, whatever "
+        "it holds.",
         "",
         "Levels follow the mesh, so steps of two meshes do not compare one by one: with a sink the finest level holds "
         f"fewer points and takes a shorter step ({1e6 * by_name['sink']['dt']:.0f} us, {by_name['sink']['levels']} "
