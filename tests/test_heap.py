@@ -1,10 +1,9 @@
 """Material that falls inside a tunnel: it lands, comes to rest, and takes up the area that its grains need."""
 
-from types import SimpleNamespace
-
 import numpy as np
 
 from coupling.postprocess import filled
+from coupling.verification import boxes
 from mpm.scene import Scene
 from mpm.solver import Solver
 from mpm.variables import MASS, SXX, SXY, SYY, SZZ, VSX, VSY, P
@@ -13,27 +12,12 @@ GRAIN_DENSITY, POROSITY, LOOSE = 2650.0, 0.45, 0.55
 
 
 def box_mesh(width, height, size, block):
-    """Crossed triangles in a closed box; only the elements inside `block` (x0, x1, y0, y1) are filled."""
-    columns, rows = round(width / size), round(height / size)
-    x, y = np.meshgrid(np.arange(columns + 1) * size - width / 2, np.arange(rows + 1) * size - height)
-    nodes = np.column_stack([x.ravel(), y.ravel()])
-    elements = []
-    for j in range(rows):
-        for i in range(columns):
-            a = j * (columns + 1) + i
-            b, c, d = a + 1, a + columns + 1, a + columns + 2
-            elements += [[a, b, d], [a, d, c]] if (i + j) % 2 else [[a, b, c], [b, d, c]]
-    elements = np.array(elements, np.int32)
-    cx, cy = nodes[elements].mean(axis=1).T
-    inside = (cx > block[0]) & (cx < block[1]) & (cy > block[2]) & (cy < block[3])
-    none = np.zeros(0, np.int32)
-    return SimpleNamespace(
-        nodes=nodes, elements=elements, region=np.where(inside, 0, 3).astype(np.int8), outer_nodes=(), outer_theta=(),
-        opening_nodes=none, corner_nodes=none, wall_nodes=none, wall_side=none, inner_nodes=none,
-        left=np.flatnonzero(x.ravel() < -width / 2 + 1e-9).astype(np.int32),
-        right=np.flatnonzero(x.ravel() > width / 2 - 1e-9).astype(np.int32),
-        bottom=np.arange(columns + 1, dtype=np.int32), top=none,
-    )  # fmt: skip
+    """A closed box; only the elements inside `block` (x0, x1, y0, y1) are filled."""
+    x, y = (np.arange(round(length / size) + 1) * size for length in (width, height))
+    left, right, bottom, top = block
+    return boxes.box_mesh(
+        x - width / 2, y - height, lambda cx, cy: (cx > left) & (cx < right) & (cy > bottom) & (cy < top)
+    )
 
 
 def dropped_block(width=1.6, size=0.1):

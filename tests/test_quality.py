@@ -62,8 +62,8 @@ def test_transfers_take_little_energy_at_short_steps():
     gate = quick().gate.model_copy(update={"corners": "slipping"})
     scene = quick(gate=gate, stop=Stop(inflow_mass=60.0, time=2.0), numerics=Numerics(courant=0.4))
     last = list(simulate(scene))[-1].balances
-    # Where the jet has just begun: 5 % on this mesh; 12 % at the default of 0.8.
-    assert 0 < last["transfer_loss"] < 0.1 * last["work_stress"]
+    # Of what stresses take of the work of gravity: 2.2 % on this mesh; 2.9 % at the default of 0.8.
+    assert 0 < last["transfer_loss"] < -0.1 * last["work_stress"]
 
 
 def test_quality_is_in_the_file_the_log_and_the_line(simulated, tmp_path):  # noqa: F811

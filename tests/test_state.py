@@ -15,12 +15,12 @@ BUILT = {
     "scene", "mesh", "soils", "parts", "geometry", "neighbours", "fixed", "contact_of_node", "n_contact", "normal",
     "active", "friction", "lining", "threads", "initial_grain_mass", "initial", "_normal_open", "_active_open",
     "_closed", "workers", "kernels", "_long_step", "_water_density", "_water_modulus", "start", "order", "occupied",
-    "n_occupied", "n_active", "_cuts", "levels", "copies", "mirror_line", "_mirrored", "_used",
+    "n_occupied", "n_active", "_cuts", "levels", "copies", "mirror_line", "_used",
     "moving", "wall", "clock", "_layout", "touched", "_spectrum", "_altitude",
 }  # fmt: skip
 #: Written by each step before it is read.
 SCRATCH = {
-    "tied_means", "status", "_spare", "_left", "_counts", "_measures",
+    "tied_means", "momenta", "status", "_spare", "_left", "_counts", "_measures",
     "_suspended", "_bad", "_n_left", "_first_left",
 }  # fmt: skip
 STATE = {*ARRAYS, *NUMBERS, "gate_open", "_mapped", "_limits", "mode"}
