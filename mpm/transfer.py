@@ -76,8 +76,8 @@ from mpm.variables import (
     Y,
 )
 
-# Twice the area between the centres of the points of opposite elements, over that of the quadrilateral, below which they
-# give no slope; 4/9 where they lie in the middle of their elements.
+# Area spanned by the ways between the points' centres in opposite elements, over that of the quadrilateral, below which
+# they give no slope; 4/9 where they lie in the middle of their elements.
 UNKNOWN_SLOPE = 0.05
 AHEAD = 16  # points whose rows are on the way into the cache: their order is known, the machine does not guess it
 
