@@ -42,7 +42,7 @@ def salencon(pressure, initial, cohesion, friction_angle, dilatancy_angle, young
 
 def cavity(
     sectors=10, outer=20.0, friction_angle=30.0, dilatancy_angle=0.0, cohesion=0.1, release=0.9, duration=0.6,
-    damping=0.3, **numerics,
+    damping=0.0, **numerics,
 ):  # fmt: skip
     """Let the wall of a cavity of 1 m radius move inwards until the share `release` of the initial pressure is gone.
 
@@ -131,7 +131,7 @@ def seepage(sectors=10, outer=6.0, conductivity=0.05, duration=1.2, **numerics):
 
 
 def trapdoor(
-    cells=8, cover=2.0, friction_angle=30.0, settlement=0.01, duration=1.0, damping=0.3, **numerics,
+    cells=8, cover=2.0, friction_angle=30.0, settlement=0.01, duration=1.0, damping=0.0, **numerics,
 ):  # fmt: skip
     """Lower a trapdoor of half width 1 m and half an element under `cover` m of sand; load on it over its weight.
 
