@@ -105,9 +105,14 @@ def _work_within(solver, steps):
 
     points = np.diff(solver.start[solver.levels.element_cuts]).astype(np.int64)
     periods = np.ones(len(points), np.int64)
-    several = choose_periods(points, float(steps), periods)
-    made = several * periods[-1]
-    return made, int(np.sum(points * (made // periods)))
+    made = updates = 0
+    several = 2
+    while several > 1:  # how to go on is chosen after each step of the coarsest level
+        several = choose_periods(points, float(steps), periods)
+        made += int(periods[-1])
+        updates += int(np.sum(points * (periods[-1] // periods)))
+        steps -= min(steps / several, float(periods[-1]))
+    return made, updates
 
 
 def _why_alone(elements, asked):

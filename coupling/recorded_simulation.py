@@ -12,7 +12,7 @@ from coupling.checkpoint import remove_checkpoints, write_checkpoint
 from coupling.datasets import RunWriter, read_history, write_attributes
 from coupling.journal import replace_file
 from coupling.provenance import root_attributes, with_history
-from coupling.quality import quality, quality_attributes, quality_line
+from coupling.quality import quality, quality_attributes, quality_line, states_line
 from coupling.run_folder import MESH_FILE, RUN_FILE, SCENE_FILE, RunRefused, how_to_go_on
 from coupling.stop_signals import stop_signals
 
@@ -42,7 +42,7 @@ class RecordedSimulation:
         self.scene, self.folder, self.report, self.threads = scene, folder, report, threads
         self.checkpoint_interval, self.remains = checkpoint_interval, remains
         self.attributes = root_attributes(scene)
-        self.writer = self.simulation = None
+        self.writer = self.simulation = self._initial = None
         self._used_before = {"wall_seconds": 0.0, "cpu_seconds": 0.0}
         self._begin = clock.monotonic(), clock.process_time()
 
@@ -121,8 +121,7 @@ class RecordedSimulation:
             )
         if about is None:
             remove_checkpoints(self.folder)
-            self._append(self.simulation.begin())
-            self._store()
+            self._initial = self.simulation.begin()
         else:
             self.simulation.restore(state)
             self._used_before = {name: about[name] for name in self._used_before}
@@ -136,6 +135,9 @@ class RecordedSimulation:
             def pause():
                 return stop.asked is not None or clock.monotonic() >= due
 
+            if self._initial is not None:
+                self._append(self._initial)
+                self._store()
             while not simulation.done:
                 record = simulation.advance(pause)
                 if record is not None:
@@ -182,12 +184,15 @@ class RecordedSimulation:
 
 
 def write_quality(file, response=None):
-    """Store the quality line of a run with it."""
+    """Store the errors of a run with it, and return them; {} without a record."""
     history = read_history(file)
+    values = {}
     if history.sizes["time"]:
         values = quality(history, response)
         write_attributes(file, **quality_attributes(values))
-        log.info("quality: %s", quality_line(values))
+        log.info("errors: %s", quality_line(values))
+        log.info("states: %s", states_line(values))
+    return values
 
 
 def mesh_sha256(mesh):

@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coupling.checkpoint import remove_checkpoints
-from coupling.datasets import read_pressures, write_response
+from coupling.datasets import read_attributes, read_pressures, write_response
 from coupling.plausibility import warn_in_python, warnings_of
 from coupling.progress_line import ProgressLine, in_notebook
+from coupling.quality import poor_errors, stored_quality
 from coupling.recorded_simulation import RecordedSimulation, write_quality
 from coupling.resume import find_remains
 from coupling.run_folder import FIGURES, LOG_FILE, RUN_FILE, RunRefused, claimed, default_folder, reopened
@@ -118,7 +119,11 @@ def run(
             remove_checkpoints(folder)
         else:
             RecordedSimulation(chosen, folder, report, threads, checkpoint_interval, remains).run()
-        finish(chosen, folder, report, figures if response is None else response, figures)
+        try:
+            finish(chosen, folder, report, figures if response is None else response, figures)
+        finally:
+            for warning in poor_errors(stored_quality(read_attributes(folder))):
+                _teller(warn)(warning)
         pressures = read_pressures(folder)
     pressures.attrs |= {"run": str(folder), "scene_name": chosen.name}
     return pressures
@@ -177,7 +182,7 @@ def finish(
             write_quality(folder / RUN_FILE, answer)
             respond_beside(scene, folder)
         except (RunRefused, LiningFailure) as problem:
-            log.error("ring: %s", problem)
+            log.error("no response of the ring: %s", problem)
             failure = problem
     pictures = []
     if figures:
@@ -214,7 +219,7 @@ def respond(scene: Scene, pressures: xr.Dataset, backend: str = "beam-spring", t
     return respond_by_name(ring, pressures, backend)
 
 
-def gate_tunnel(scene):
+def gate_tunnel(scene: Scene) -> int:
     """Number of the tunnel with the gate, 0 without one."""
     return scene.mpm.gate.tunnel if scene.mpm.gate else 0
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import runpy
+from collections.abc import Iterable
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -72,7 +73,7 @@ def model_name(name: str) -> str:
     return name.rpartition(":")[2]
 
 
-def in_order(names) -> list[str]:
+def in_order(names: Iterable[str]) -> list[str]:
     """Names of models as they are shown: the built-in ones first, the one of a run leading, then by the alphabet."""
     return sorted(names, key=lambda name: (list(_BUILT_IN).index(name) if name in _BUILT_IN else len(_BUILT_IN), name))
 

@@ -46,7 +46,7 @@ def test_response_that_fails_leaves_the_pictures_of_the_ground(tmp_path):
     (tmp_path / "weak.toml").write_text(scene.source)
     result = CliRunner().invoke(cli.app, ["run", str(tmp_path / "weak.toml"), "--out", str(tmp_path / "run")])
     assert result.exit_code == 3
-    assert "equilibrium" in result.stderr and "pressures and pictures are in" in result.stderr
+    assert "equilibrium" in result.stderr and "the ground is computed and drawn in" in result.stderr
     drawn = {path.stem for path in (tmp_path / "run" / "figures").glob("*.png")}
     assert drawn == {"mesh", "fields", "pressures", "inflow"}
     run = coupling.read_run(tmp_path / "run")

@@ -30,10 +30,8 @@ def kinds(outputs):
 
 
 def test_scene_and_ring_show_themselves_as_tables(cells):
-    for outputs, parts in (
-        (cells[0], ["scene &#x27;quick&#x27;", "gate in the lining"]),
-        (cells[-1], ["Ring", "joint_angles"]),
-    ):
+    scene, ring = ["scene &#x27;quick&#x27;", "gate in the lining"], ["Ring", "joint_angles"]
+    for outputs, parts in ((cells[0], scene), (cells[-1], ring)):
         assert kinds(outputs) == ["text/html"]
         assert all(part in outputs[0]["data"]["text/html"] for part in parts)
 

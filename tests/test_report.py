@@ -164,7 +164,10 @@ def test_the_page_of_a_long_run_stays_under_ten_megabytes(tree, tmp_path):
     mesh = xr.Dataset({"x": ("node", nodes[0]), "y": ("node", nodes[1]), "region": ("element", np.zeros(400_000, "i1")),
                        "element_nodes": (("element", "corner"), np.arange(1_200_000).reshape(-1, 3) % 200_000)},
                       attrs=geometry)  # fmt: skip
-    models = {f"/structure/{name}": response for name in ("beam-spring", "continuum", "third")}
+    models = {
+        f"/{datasets.structure_group(name)}": response.assign_attrs(model=name)
+        for name in ("beam-spring", "continuum", "third")
+    }
     long = xr.DataTree.from_dict({"/lining": lining, "/history": history, "/points": many, "/mesh": mesh, **models})
     frames = series.choose_frames(long)
     player = run_page._player(long, None, frames, fields.field_snapshots(many))
