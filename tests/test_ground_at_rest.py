@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from scipy.special import erfc
 from small_event import COARSE
 
