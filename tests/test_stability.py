@@ -84,7 +84,8 @@ def test_a_run_with_spectral_steps_takes_longer_ones_to_the_same_end():
         while solver.time < 0.02 * (1 - 1e-12):
             solver.step(0.02 - solver.time)
         ends[way] = solver.step_count, solver.points_by_name()["pore_pressure"]
-    assert ends["spectral"][0] < 0.6 * ends["altitude"][0]
+    # the altitude does not know of the damping, which lowers the critical step
+    assert ends["spectral"][0] < 0.6 * math.sqrt(1 + 2 * numerics.stress_damping) * ends["altitude"][0]
     change = np.ptp(ends["altitude"][1])
     assert np.abs(ends["spectral"][1] - ends["altitude"][1]).max() < 0.02 * change
 
@@ -100,15 +101,23 @@ def test_a_dozen_extremes_are_representative():
 
 
 def test_energy_from_nothing_is_found():
-    # dilatancy behind the back of a kernel that was chosen for none: mean volume changes for a dilatant soil
+    # grains that are pushed on behind the back of the solver: a per cent of their velocity each step
     from coupling.stability.extremes import follow
     from coupling.stability.monitor import Monitor
-    from mpm.variables import S_SIN_DIL
 
-    scene = box_scene(0.1, bulk_modulus=None)
-    solver = Solver(scene, box_of(0.1, 0, 6, 0, 6), threads=1)
-    solver.soils[:, S_SIN_DIL] = math.sin(math.radians(25.0))
-    faults, _ = follow(Monitor(solver), 0.1)
+    class Pushed(Solver):
+        def step(self, dt_max=math.inf):
+            done = super().step(dt_max)
+            self.points[:, 2:4] *= 1.01
+            return done
+
+    faults = {}
+    for kind in (Solver, Pushed):
+        solver = kind(box_scene(0.1, bulk_modulus=None), box_of(0.1, 0, 6, 0, 6), threads=1)
+        solver.points[:, 2] = 1e-3 * np.cos(np.pi * solver.points[:, 0] / 0.6)
+        faults[kind], _ = follow(Monitor(solver), 0.1)
+    assert not any("energy from nothing" in fault for fault in faults[Solver])
+    faults = faults[Pushed]
     assert any("energy from nothing" in fault for fault in faults)
 
 
