@@ -31,7 +31,7 @@ def test_comparison_leaves_the_run_as_it_is(folder, tmp_path):
     assert contents(folder) == before
     # the ring with a hole is kept where it belongs
     with xr.open_dataset(tmp_path / "compared" / "continuum.nc", engine="h5netcdf") as stored:
-        assert stored.attrs["opening_cut"] == 0.17
+        assert stored.attrs["gate_cut"] == 0.17
 
 
 def test_response_to_own_pressures_leaves_their_file_as_it_is(written, tmp_path):  # noqa: F811
