@@ -87,7 +87,7 @@ def run_command(
     """
     with failures(), checked_json(json_path), checked_json(events), EventStream(events) as stream, told_warnings():
         from coupling.datasets import RunFileError, read_response
-        from coupling.quality import quality_line
+        from coupling.quality import quality_line, states_line, verdicts
         from coupling.run import run
         from coupling.run_folder import FIGURES, RunRefused
         from coupling.scene import load_scene, parse_changes
@@ -106,6 +106,7 @@ def run_command(
         with contextlib.suppress(RunFileError):
             data["response"] = summarise_response(read_response(folder))
             data["quality"]["lining_equilibrium"] = data["response"]["equilibrium_residual"]
+            data["verdicts"] = verdicts(data["quality"])
             for tunnel, one in data["tunnels"].items():
                 one["response"] = summarise_response(read_response(folder, tunnel=tunnel))
         data["figures"] = sorted(str(path) for path in (folder / FIGURES).glob("*.png"))
@@ -120,6 +121,7 @@ def run_command(
                 if one["response"]:
                     console.print(_response_table(one["response"], tunnel))
             console.print(f"errors: {quality_line(data['quality'])}", highlight=False)
+            console.print(f"states of the points, no errors: {states_line(data['quality'])}", highlight=False)
             console.print(f"results in {folder}", highlight=False, soft_wrap=True)
 
 

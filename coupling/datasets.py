@@ -68,15 +68,34 @@ PROGRESS = {
     "flow_zone_area": ("m^2", "area of soil displaced by more than 50 mm"),
     "disturbed_area": ("m^2", "area of soil displaced by 10 to 50 mm"),
 }
-#: Of these the balances: see :meth:`mpm.Solver.balances`.
+#: Errors, largest so far: see :func:`mpm.errors.errors`.
+ERRORS = {
+    "water_lost": ("1", "water lost or made, over the water that came through the gate"),
+    "momentum_error": (
+        "1",
+        "departure of the points' momentum from what the nodes received, over that of the flow zone",
+    ),
+    "energy_error": ("1", "kinetic energy that transfers took or gave, over that of the flow zone"),
+    "overlap": ("1", "share of all material that stands where there is no room"),
+    "flow_overlap": ("1", "share of the flow zone's material that stands where there is no room"),
+}
+#: What they come from, and the balances: see :meth:`mpm.Solver.balances`.
 BALANCES = {
-    "momentum_error": ("1", "momentum of the points less what the nodes received, over the impulse of gravity"),
-    "water_mass_error": ("1", "change of the mass of the water, over the initial mass"),
+    "momentum_departure": ("N s/m", "momentum of the points less what the nodes received, size"),
+    "flow_momentum": ("N s/m", "sum of the sizes of the momenta of grains and water in the flow zone"),
+    "water_missing": ("kg/m", "water at the start less that now"),
+    "water_inflow": ("kg/m", "water that came through the outer face of the gate, that taken out included"),
+    "flow_water": ("kg/m", "water of the flow zone"),
     "work_gravity": ("J/m", "work of gravity on grains and water since the gate opened"),
     "work_stress": ("J/m", "work of stresses and pore pressure since the gate opened, positive where it accelerates"),
     "work_drag": ("J/m", "work of the drag between water and grains since the gate opened"),
     "kinetic_energy_change": ("J/m", "change of the kinetic energy of grains and water since the gate opened"),
     "transfer_loss": ("J/m", "kinetic energy lost between points and nodes since the gate opened"),
+    "flow_energy": ("J/m", "kinetic energy of grains and water in the flow zone"),
+    "material_volume": ("m^2", "area of all material in the mesh"),
+    "flow_volume": ("m^2", "area of the material of the flow zone in the mesh"),
+    "overlap_volume": ("m^2", "area of material that cells hold beyond their own"),
+    "flow_overlap_volume": ("m^2", "the flow zone's part of the area of material that cells hold beyond their own"),
     "contact_error": ("1", "momentum at the lining that the recorded reactions do not explain, over their sum"),
     "largest_courant": ("1", "largest time step so far over the critical one of the state it led to"),
 }
@@ -85,15 +104,20 @@ HISTORY = {
     **PROGRESS,
     "grain_mass": ("kg/m", "mass of all grains, those taken out included; constant"),
     "suspended_fraction": ("1", "share of points whose grains do not touch"),
+    "tip_fraction": (
+        "1",
+        "share of points at the tip of the Mohr-Coulomb cone: grains touch, unpressed, and bear nothing",
+    ),
     "kinetic_energy": ("J/m", "kinetic energy of the grains"),
     "max_velocity": ("m/s", "largest velocity of the grains"),
+    **ERRORS,
     **BALANCES,
     "dt": ("s", "mean time step in the interval"),
     "steps": ("1", "time steps since the gate opened"),
     "point_steps": ("1", "updates of one point by one step since the gate opened"),
     "cpu_seconds": ("s", "processor time since the simulation started"),
     "dt_limit": ("1", "what limited the time step most often in the interval"),
-    **{f"clamp_{name}": ("1", f"updates at which the limit '{name}' acted, since the start") for name in CLAMPS},
+    **{f"clamp_{name}": ("1", f"point-steps that ended so since the start: {label}") for name, label in CLAMPS.items()},
 }
 INTEGERS = {"steps", "point_steps", *(f"clamp_{name}" for name in CLAMPS)}
 #: Variables on (time, point) of `/points`, from the solver's own table.
@@ -322,6 +346,8 @@ class RunWriter:
                 values = [record.clamp_counts.get(name.removeprefix("clamp_"), 0) for record in batch]
             elif name in BALANCES:
                 values = [record.balances[name] for record in batch]
+            elif name in ERRORS:
+                values = [record.errors[name] for record in batch]
             elif name == "dt_limit":
                 values = [_limit_flag(record.dt_limit) for record in batch]
             else:

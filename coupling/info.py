@@ -117,6 +117,7 @@ def _run_facts(file):
     import h5netcdf
 
     from coupling.datasets import read_attributes, read_history
+    from coupling.quality import poor_errors, quality_line, stored_quality
 
     attributes, history = read_attributes(file), read_history(file)
     facts = {
@@ -137,7 +138,9 @@ def _run_facts(file):
         stored = content["structure"].groups if "structure" in content.groups else {}
         models = [str(group.attrs.get("model", name)) for name, group in stored.items()]
     facts["lining models"] = ", ".join(models) or "none"
-    return facts
+    errors = stored_quality(attributes)
+    facts |= {"errors": quality_line(errors)} if errors else {}
+    return facts | {f"warning {k}": text for k, text in enumerate(poor_errors(errors), start=1)}
 
 
 def _run_commands(path, facts):

@@ -12,7 +12,7 @@ from coupling.checkpoint import remove_checkpoints, write_checkpoint
 from coupling.datasets import RunWriter, read_history, write_attributes
 from coupling.journal import replace_file
 from coupling.provenance import root_attributes, with_history
-from coupling.quality import quality, quality_attributes, quality_line
+from coupling.quality import quality, quality_attributes, quality_line, states_line
 from coupling.run_folder import MESH_FILE, RUN_FILE, SCENE_FILE, RunRefused, how_to_go_on
 from coupling.stop_signals import stop_signals
 
@@ -184,12 +184,15 @@ class RecordedSimulation:
 
 
 def write_quality(file, response=None):
-    """Store the quality line of a run with it."""
+    """Store the errors of a run with it, and return them; {} without a record."""
     history = read_history(file)
+    values = {}
     if history.sizes["time"]:
         values = quality(history, response)
         write_attributes(file, **quality_attributes(values))
-        log.info("quality: %s", quality_line(values))
+        log.info("errors: %s", quality_line(values))
+        log.info("states: %s", states_line(values))
+    return values
 
 
 def mesh_sha256(mesh):

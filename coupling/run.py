@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coupling.checkpoint import remove_checkpoints
-from coupling.datasets import read_pressures, write_response
+from coupling.datasets import read_attributes, read_pressures, write_response
 from coupling.plausibility import warn_in_python, warnings_of
 from coupling.progress_line import ProgressLine, in_notebook
+from coupling.quality import poor_errors, stored_quality
 from coupling.recorded_simulation import RecordedSimulation, write_quality
 from coupling.resume import find_remains
 from coupling.run_folder import FIGURES, LOG_FILE, RUN_FILE, RunRefused, claimed, default_folder, reopened
@@ -118,7 +119,11 @@ def run(
             remove_checkpoints(folder)
         else:
             RecordedSimulation(chosen, folder, report, threads, checkpoint_interval, remains).run()
-        finish(chosen, folder, report, figures if response is None else response, figures)
+        try:
+            finish(chosen, folder, report, figures if response is None else response, figures)
+        finally:
+            for warning in poor_errors(stored_quality(read_attributes(folder))):
+                _teller(warn)(warning)
         pressures = read_pressures(folder)
     pressures.attrs |= {"run": str(folder), "scene_name": chosen.name}
     return pressures

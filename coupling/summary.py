@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from coupling.datasets import read_attributes, read_history, read_pressures
-from coupling.quality import quality
+from coupling.quality import quality, verdicts
 from mpm.variables import CLAMPS
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def summarise_run(run: str | Path) -> dict[str, Any]:
         scene, status, status_message; records; time [s]; inflow_mass [kg/m]; flow_zone_area, disturbed_area [m2];
         steps; point_steps; mean_dt [s]; dt_limit; max_velocity [m/s]; grain_mass_error [-]: largest relative
         departure from the initial grain mass; wall_seconds, cpu_seconds, point_steps_per_cpu_second; clamps: updates
-        at which each limit acted; quality: see :func:`coupling.quality.quality`; soil_pressure, water_pressure [Pa]:
+        at which each limit acted; quality, verdicts: see :mod:`coupling.quality`; soil_pressure, water_pressure [Pa]:
         place to {initial, final}, of the tunnel with the gate; tunnels: number of any other to the same two and
         `response`, None.
     """
@@ -58,6 +58,7 @@ def summarise_run(run: str | Path) -> dict[str, Any]:
         "clamps": {name: int(last[f"clamp_{name}"]) for name in CLAMPS},
         "quality": quality(history),
     }
+    data["verdicts"] = verdicts(data["quality"])
     data["tunnels"] = {}
     if "tunnel" in pressures.dims:
         gate = int(pressures.attrs.get("gate_tunnel", 0))

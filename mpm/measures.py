@@ -4,7 +4,35 @@ import numpy as np
 
 from mpm.half_model import with_mirrored_points
 from mpm.points import mass_inside
-from mpm.variables import LEDGER, MASS, POINT_VARIABLES, VLX, VLY, VSX, VSY, X0, Y0, N, P, X, Y
+from mpm.variables import (
+    LEDGER,
+    MASS,
+    MODEL_ELASTIC,
+    POINT_VARIABLES,
+    S_G,
+    S_LOOSE,
+    S_MODEL,
+    S_TENSION,
+    SXX,
+    SXY,
+    SYY,
+    SZZ,
+    VLX,
+    VLY,
+    VSX,
+    VSY,
+    X0,
+    Y0,
+    N,
+    P,
+    X,
+    Y,
+)
+
+#: Displacement beyond which a point belongs to the flow zone, and to the disturbed zone [m].
+FLOWS, DISTURBED = 0.05, 0.01
+#: What sums of a cell may be off by, over its area, and rotated stresses, over stress and shear modulus [-].
+ROUNDING = 1e-9
 
 #: Acceleration of a grain at the gate over gravity: what presses 20 m below ground, over a gate's width of 0.2 m.
 STEEPEST = 100.0
@@ -62,23 +90,35 @@ class Measures:
     def sums_over_points(self):
         """Momentum (x, y) [N s] and kinetic energy [J] of grains and water, mass of the water [kg], per metre.
 
-        Points taken out are left out. Water is counted with its compression, or with what is missing of it.
+        Points taken out count with what they left with. Water is counted with its compression, or with what is missing
+        of it.
         """
-        rows = self.points[self.element_of_point >= 0]
+        rows, wet = self.points, self._pore_water()
         mass = rows[:, MASS]
         # sums, no dot products: those of BLAS depend on its number of threads in the last bits
-        momentum = np.array([np.sum(mass * rows[:, VSX]), np.sum(mass * rows[:, VSY])])
-        kinetic = 0.5 * float(np.sum(mass * (rows[:, VSX] ** 2 + rows[:, VSY] ** 2)))
-        water = 0.0
-        if self.scene.water is not None:
-            volume = self._volumes()[self.element_of_point >= 0]
-            wet = self._water_density * rows[:, N] * volume
-            momentum += np.array([np.sum(wet * rows[:, VLX]), np.sum(wet * rows[:, VLY])])
-            kinetic += 0.5 * float(np.sum(wet * (rows[:, VLX] ** 2 + rows[:, VLY] ** 2)))
-            water = float(wet.sum())
-            if self._water_modulus > 0:
-                water += float(np.sum(wet * rows[:, P])) / self._water_modulus
-        return {"momentum": momentum, "kinetic": kinetic, "water": water}
+        momentum = [np.sum(mass * rows[:, s] + wet * rows[:, w]) for s, w in ((VSX, VLX), (VSY, VLY))]
+        return {
+            "momentum": np.array(momentum),
+            "kinetic": float(np.sum(self._kinetic_energies(wet))),
+            "water": float(np.sum(self._held_water(wet))),
+        }
+
+    def _pore_water(self):
+        """Water that fills the pores of every point at zero pressure [kg/m]; zero in a dry scene."""
+        return self._water_density * self.points[:, N] * self._volumes()
+
+    def _held_water(self, wet):
+        """The same with what its pressure has squeezed in, or without what is missing."""
+        return wet * (1 + self.points[:, P] / self._water_modulus) if self._water_modulus > 0 else wet
+
+    def _kinetic_energies(self, wet):
+        grains = self.points[:, VSX] ** 2 + self.points[:, VSY] ** 2
+        water = self.points[:, VLX] ** 2 + self.points[:, VLY] ** 2
+        return 0.5 * (self.points[:, MASS] * grains + wet * water)
+
+    def _moved(self):
+        """Displacement of every point [m]."""
+        return np.hypot(self.points[:, X] - self.points[:, X0], self.points[:, Y] - self.points[:, Y0])
 
     def balances(self):
         """How far the state of the points is from what was done to them, as a dict of floats.
@@ -86,27 +126,22 @@ class Measures:
         Returns
         -------
         dict
-            momentum_error [-]: departure of the points' momentum from what the nodes received, over the impulse of
-            gravity; water_mass_error [-]: change of the water's mass over the initial; work_gravity, work_stress,
-            work_drag, kinetic_energy_change, transfer_loss [J/m]: energies since the start, the last what the way from
-            points to nodes and back (PIC, MUSL) took; contact_error [-]: change of the momentum at the lining that the
-            recorded reactions do not explain, over their sum; largest_courant [-]: time step over the critical one of
-            the state it led to.
-
-        With a sink momentum, energy and water leave with the points taken out, and count as errors.
+            momentum_departure [N s/m]: what the points' momentum differs by from what the nodes received, the larger
+            component; water_missing [kg/m]: water at the start less that now; work_gravity, work_stress, work_drag,
+            kinetic_energy_change, transfer_loss [J/m]: energies since the start, the last what the way from points to
+            nodes and back (PIC, MUSL) took; contact_error [-]: change of the momentum at the lining that the recorded
+            reactions do not explain, over their sum; largest_courant [-]: time step over the critical one of the state
+            it led to; and the `flow_amounts` that these are compared with.
         """
         ledger, now = dict(zip(LEDGER, self.ledger.sum(axis=0).tolist(), strict=True)), self.sums_over_points()
         received = np.array([ledger["momentum_x"], ledger["momentum_y"]])
         departure = np.abs(now["momentum"] - self.initial["momentum"] - received)
         if self.scene.is_half:
             departure = departure[1:]  # horizontal momentum comes from the mirror image, which takes as much
-        departure = float(departure.max())
-        weight = self.scene.gravity * (self.initial_grain_mass + self.initial["water"]) * self.time
         change = now["kinetic"] - self.initial["kinetic"]
-        water = self.initial["water"]
         return {
-            "momentum_error": departure / weight if weight > 0 else 0.0,
-            "water_mass_error": now["water"] / water - 1 if water > 0 else 0.0,
+            "momentum_departure": self.copies * float(departure.max()),
+            "water_missing": self.copies * (self.initial["water"] - now["water"]),
             "work_gravity": self.copies * ledger["gravity"],
             "work_stress": self.copies * ledger["stress"],
             "work_drag": self.copies * ledger["drag"],
@@ -114,21 +149,81 @@ class Measures:
             "transfer_loss": self.copies * (ledger["kinetic"] - change),
             "contact_error": ledger["unexplained"] / ledger["reactions"] if ledger["reactions"] > 0 else 0.0,
             "largest_courant": self.largest_courant,
+            **self.flow_amounts(),
         }
+
+    def flow_amounts(self):
+        """What flows, and what of the material stands where there is no room, as a dict of floats.
+
+        Returns
+        -------
+        dict
+            flow_momentum [N s/m]: sum of the sizes of the momenta of grains and water, flow_energy [J/m]: their kinetic
+            energy, and flow_water [kg/m], of the points of the flow zone, those taken out included; water_inflow
+            [kg/m]: water that came through the outer face of the gate, that taken out included; material_volume,
+            flow_volume [m2]: volume of all points in the mesh, and of those of the flow zone; overlap_volume,
+            flow_overlap_volume [m2]: what the cells hold beyond their area, of all points and of those of the flow
+            zone, which takes part in it by its share of the cell.
+        """
+        wet, volume, flows = self._pore_water(), self._volumes(), self._moved() > FLOWS
+        held, element = self._held_water(wet), self.element_of_point
+        grains, water = (np.hypot(self.points[:, x], self.points[:, y]) for x, y in ((VSX, VSY), (VLX, VLY)))
+        momenta = self.points[:, MASS] * grains + wet * water
+        inside, flows_inside = element >= 0, flows & (element >= 0)
+        cell = element // 4
+        area = self.geometry[:, 6].reshape(-1, 4).sum(axis=1)
+        in_cell, flowing = (np.bincount(cell[k], volume[k], len(area)) for k in (inside, flows_inside))
+        beyond = np.maximum(in_cell - area, 0.0)
+        beyond[beyond < ROUNDING * area] = 0.0
+        flow_beyond = beyond * np.divide(flowing, in_cell, out=np.zeros_like(area), where=in_cell > 0)
+        amounts = {
+            "flow_momentum": momenta[flows].sum(),
+            "flow_energy": self._kinetic_energies(wet)[flows].sum(),
+            "flow_water": held[flows].sum(),
+            "water_inflow": held[self._past_the_gate()].sum(),
+            "material_volume": in_cell.sum(),
+            "flow_volume": flowing.sum(),
+            "overlap_volume": beyond.sum(),
+            "flow_overlap_volume": flow_beyond.sum(),
+        }
+        return {name: self.copies * float(amount) for name, amount in amounts.items()}
+
+    def _past_the_gate(self):
+        """Whether a point is inside the outer face of the gate's tunnel, or was taken out there."""
+        if self.scene.gate is None:
+            return np.zeros(self.n_points, bool)
+        tunnel = self.scene.tunnels[self.scene.gate.tunnel]
+        away = np.hypot(self.points[:, X] - tunnel.x, self.points[:, Y] + tunnel.axis_depth)
+        return (away < tunnel.outer_radius) | (self.element_of_point < 0)
+
+    def tip_fraction(self):
+        """Share of the points at the tip of the Mohr-Coulomb cone, or at the tensile strength that cuts it off [-].
+
+        Their grains touch without being pressed together: they bear no more tension than the soil has strength.
+        """
+        soil, rows = self.soils[self.soil_of_point], self.points
+        centre = 0.5 * (rows[:, SXX] + rows[:, SYY])
+        radius = np.hypot(0.5 * (rows[:, SXX] - rows[:, SYY]), rows[:, SXY])
+        largest = np.maximum(centre + radius, rows[:, SZZ])
+        size = np.abs(centre) + radius + np.abs(rows[:, SZZ])
+        at_tip = (largest >= soil[:, S_TENSION] - ROUNDING * (size + soil[:, S_G])) & (rows[:, N] < soil[:, S_LOOSE])
+        at_tip &= (soil[:, S_MODEL] != MODEL_ELASTIC) & (self.element_of_point >= 0)
+        return float(np.count_nonzero(at_tip)) / max(self.n_active, 1)
 
     def measures(self):
         """Zones, balances and extremes of the state at hand, as a dict of floats."""
-        moved = np.hypot(self.points[:, X] - self.points[:, X0], self.points[:, Y] - self.points[:, Y0])
-        flow = moved > 0.05
+        moved = self._moved()
+        flow = moved > FLOWS
         mass = self.points[:, MASS]
         speed2 = self.points[:, VSX] ** 2 + self.points[:, VSY] ** 2
         active = self.element_of_point >= 0
         return {
             "inflow_mass": self.inflow_mass(),
             "flow_zone_area": self.copies * float(np.sum(self.initial_volume[flow])),
-            "disturbed_area": self.copies * float(np.sum(self.initial_volume[(moved > 0.01) & ~flow])),
+            "disturbed_area": self.copies * float(np.sum(self.initial_volume[(moved > DISTURBED) & ~flow])),
             "grain_mass": self.copies * float(np.sum(mass)),
             "suspended_fraction": float(self.suspended) / max(self.n_active, 1),
+            "tip_fraction": self.tip_fraction(),
             "kinetic_energy": self.copies * float(0.5 * np.sum((mass * speed2)[active])),
             "max_velocity": float(np.sqrt(speed2[active].max(initial=0.0))),
         }

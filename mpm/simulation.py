@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mpm.clock import ALMOST_ALL
+from mpm.errors import errors, largest_so_far
 from mpm.meshing import build_mesh
 from mpm.solver import RunFailed, Solver
 from mpm.state import restore_solver, solver_state
@@ -33,7 +34,7 @@ class Record:
     soil_shear (clockwise traction on the lining) and the standard deviation of the first two within the interval;
     of a lining that moves also its displacement at the end, and of an elastic one its forces
     (`mpm.wall.MovingLinings.motion_at`).
-    `balances` are those of :meth:`mpm.Solver.balances`.
+    `balances` are those of :meth:`mpm.Solver.balances`, `errors` those of :func:`mpm.errors.errors`.
     """
 
     time: float
@@ -46,10 +47,12 @@ class Record:
     disturbed_area: float
     grain_mass: float
     suspended_fraction: float
+    tip_fraction: float
     kinetic_energy: float
     max_velocity: float
     clamp_counts: dict = field(repr=False)
     balances: dict = field(repr=False)
+    errors: dict = field(repr=False)
     point_steps: int
     cpu_seconds: float
     points: dict | None = field(repr=False)
@@ -107,6 +110,7 @@ class Simulation:
         self._next_snapshot = scene.output.snapshot_interval or np.inf
         self._inflow, self._checked = 0.0, -STEPS_BETWEEN_CHECKS  # kg/m, and when
         self._near = False  # whether the inflow may reach its stop before it is checked again
+        self._largest = {}  # departures and amounts of the balances at the records so far
         self._progress = progress
         self._last_report = clock.monotonic(), 0
 
@@ -225,6 +229,7 @@ class Simulation:
             "checked": self._checked,
             "near": self._near,
             "reached": self._reached,
+            "largest": json.dumps(self._largest),
             "done": self.done,
             "cpu_seconds": self.cpu_seconds,
         }
@@ -244,6 +249,7 @@ class Simulation:
         self._next_snapshot, self._inflow = float(state["next_snapshot"]), float(state["inflow_mass"])
         self._checked, self._near = int(state["checked"]), bool(state.get("near", True))
         self._reached, self.done = bool(state["reached"]), bool(state["done"])
+        self._largest = json.loads(state["largest"])
         self._cpu_begin = clock.process_time() - float(state["cpu_seconds"])
         self._last_report = clock.monotonic(), self.solver.point_steps
 
@@ -254,6 +260,8 @@ class Simulation:
 
     def _record(self, duration, dt, limit, snapshot):
         solver = self.solver
+        balances = solver.balances()
+        self._largest = largest_so_far(self._largest, balances)
         return Record(
             time=solver.time,
             dt=dt,
@@ -261,7 +269,8 @@ class Simulation:
             steps=solver.step_count,
             lining=solver.lining_pressures(duration),
             clamp_counts=dict(zip(CLAMPS, solver.clamps.sum(axis=0).tolist(), strict=True)),
-            balances=solver.balances(),
+            balances=balances,
+            errors=errors(self._largest),
             point_steps=solver.point_steps,
             cpu_seconds=self.cpu_seconds,
             points=solver.points_by_name() if snapshot and self.scene.output.points else None,

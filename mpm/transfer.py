@@ -76,6 +76,9 @@ from mpm.variables import (
     Y,
 )
 
+# Area spanned by the ways between the points' centres in opposite elements, over that of the quadrilateral, below which
+# they give no slope; 4/9 where they lie in the middle of their elements.
+UNKNOWN_SLOPE = 0.05
 AHEAD = 16  # points whose rows are on the way into the cache: their order is known, the machine does not guess it
 
 
@@ -109,7 +112,7 @@ def resolved_pressure(e, geometry, contents):
     mean, x, y, slope_x, slope_y, share : float
         Volume mean of the pressure without its alternating part [Pa], at (x, y) [m]; slope [Pa/m] of the quadrilateral,
         lessened where the pressure would be negative at a corner of the element; share 0 where the quadrilateral is not
-        occupied throughout: nothing is known then, else 1.
+        occupied throughout, or its points lie almost on a line: nothing is known then, else 1.
 
     Source: Gritton & Berzins (2017), Improving accuracy in the MPM method using a null space filter; the alternating
     mode: Nagtegaal, Parks & Rice (1974), the constraint that follows from the three others.
@@ -127,6 +130,8 @@ def resolved_pressure(e, geometry, contents):
     xc, yc, xd, yd = contents[c, E_X] / vc, contents[c, E_Y] / vc, contents[d, E_X] / vd, contents[d, E_Y] / vd
     ux, uy, wx, wy = xa - xc, ya - yc, xb - xd, yb - yd
     det = ux * wy - uy * wx
+    if det < UNKNOWN_SLOPE * (geometry[a, 6] + geometry[b, 6] + geometry[c, 6] + geometry[d, 6]):
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     sx = (wy * (pa - pc) - uy * (pb - pd)) / det
     sy = (ux * (pb - pd) - wx * (pa - pc)) / det
     # sum of the alternating pattern in v p: zero for a linear pressure

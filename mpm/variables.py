@@ -48,8 +48,15 @@ ELEMENT_CONTENTS = 4
 SOIL_WIDTH = 13
 MODEL_ELASTIC, MODEL_MOHR_COULOMB = 0, 1
 
-# Values that a clamp of the physics may touch; each is counted and reported with the run.
-CLAMPS = ("tension", "suspended", "cavitated", "porosity_floor", "porosity_ceiling", "returned_to_mesh")
+#: What stress, pressure, porosity and place of a point may be held at; each is counted and reported with the run.
+CLAMPS = {
+    "tension": "tip of the Mohr-Coulomb cone",
+    "suspended": "grains apart",
+    "cavitated": "pores not full",
+    "porosity_floor": "densest porosity",
+    "porosity_ceiling": "loosest porosity",
+    "returned_to_mesh": "put back onto a wall",
+}
 (C_TENSION, C_SUSPENDED, C_CAVITATED, C_FLOOR, C_CEILING, C_RETURNED) = range(len(CLAMPS))
 POROSITY_FLOOR = 0.05
 POROSITY_CEILING = 0.90

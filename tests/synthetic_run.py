@@ -3,7 +3,7 @@
 import numpy as np
 
 import coupling
-from coupling.datasets import BALANCES
+from coupling.datasets import BALANCES, ERRORS
 from mpm.simulation import Record
 from mpm.variables import CLAMPS, POINT_VARIABLES
 
@@ -57,9 +57,11 @@ def record(time, n_tunnels=1, snapshot=False):
         disturbed_area=40.0 * time,
         grain_mass=5e6,
         suspended_fraction=0.01 * time,
+        tip_fraction=0.01 * time,
         kinetic_energy=10.0 * time,
         max_velocity=time,
-        balances={name: 1e-6 * k for k, name in enumerate(BALANCES)},
+        balances={name: 1e-6 * k for k, name in enumerate(BALANCES)} | {"contact_error": 1e-14},
+        errors={name: 1e-6 * k for k, name in enumerate(ERRORS)},
         clamp_counts={name: k for k, name in enumerate(CLAMPS)},
         point_steps=int(time * 1e8),
         cpu_seconds=time,

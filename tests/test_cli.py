@@ -95,6 +95,24 @@ def test_run_writes_everything_and_prints_a_table(simulated, tmp_path):
     assert json.loads((tmp_path / "b.json").read_text())["axial_force"] == data["response"]["axial_force"]
 
 
+def test_poor_error_is_a_warning_with_a_remedy_in_the_run_its_log_and_its_report(simulated, tmp_path, monkeypatch):
+    from coupling.quality import ERRORS
+
+    fine = gush("run", "quick", "--out", tmp_path / "fine")
+    assert fine.exit_code == 0 and "warning: water lost" not in fine.output
+    monkeypatch.setitem(ERRORS, "water_lost", ERRORS["water_lost"]._replace(good=-1.0, fair=-1.0))
+    poor = gush("run", "quick", "--out", tmp_path / "poor", "--json", tmp_path / "poor.json")
+    told = "water lost 0.0% of what came in is poor"
+    assert poor.exit_code == 0 and f"warning: {told}" in poor.output
+    assert "points_per_element_gate" in poor.output
+    assert told in (tmp_path / "poor" / "run.log").read_text()
+    verdicts = json.loads((tmp_path / "poor.json").read_text())["verdicts"]
+    assert verdicts["water_lost"] == "poor" and verdicts["momentum_error"] == "good"
+    assert gush("report", tmp_path / "poor").exit_code == 0
+    page = (tmp_path / "poor" / "report.html").read_text()
+    assert "Outside what is expected: water lost" in page and "No warnings" not in page
+
+
 def test_values_of_the_scene_are_set_on_the_command_line(simulated, tmp_path):
     changes = ("--set", "gate.angle=45", "--set", "gate.width=15 cm", "--set", "soils.0.friction_angle=33")
     result = gush("run", "quick", *changes, "--out", tmp_path / "a", "--no-figures")

@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+from scipy.special import erfc
+from small_event import COARSE
 
 import coupling
 import mpm
+from coupling.stability.amplification import Column
 from mpm.points import initial_stress
-from mpm.variables import SXY, VLY, VSX, P
+from mpm.variables import SXX, SXY, VLY, VSX, X0, Y0, P, Y
 
 
 @pytest.fixture(scope="module")
@@ -68,3 +71,57 @@ def test_ground_with_a_rough_lining_stays_at_rest():
     lining = solver.lining_pressures(solver.time)[0]
     soil, _water, _, _ = theory(scene, lining["theta"])
     assert np.all(np.isfinite(lining["soil_pressure"])) and soil.min() > 0
+
+
+def change_in(solver, time):
+    """Largest changes of the pore pressure that acts and of the effective stresses until a time [Pa]."""
+    before = by_place(solver)
+    while solver.time < time * (1 - 1e-12):
+        solver.advance(time)
+    after = by_place(solver)
+    pressures = np.maximum(after[:, P], 0.0) - np.maximum(before[:, P], 0.0)
+    return np.abs(pressures).max(), np.abs(after[:, SXX : SXY + 1] - before[:, SXX : SXY + 1]).max()
+
+
+def by_place(solver):
+    return solver.points[np.lexsort((solver.points[:, X0], solver.points[:, Y0]))]
+
+
+@pytest.mark.parametrize("depth", [0.0, 10.0])
+def test_two_soils_stay_at_rest_below_a_lowered_water_table(depth):
+    soil = coupling.load_scene("quick").mpm.soils[0].model_dump() | {"hydraulic_conductivity": 1e-7}
+    lower = {"name": "lower", "top_depth": 31.0, "youngs_modulus": 8e7, "porosity": 0.38, "k0": 0.5}
+    scene = coupling.load_scene(
+        "quick", gate="none", soils=[soil, soil | lower], water={"table_depth": depth}, discretisation=COARSE
+    ).mpm
+    rough = scene.tunnels[0].model_copy(update={"friction_coefficient": 0.6})
+    scene = scene.model_copy(update={"tunnels": (rough,)})
+    solver = mpm.Solver(scene, mpm.build_mesh(scene))
+    solver.relax()
+    pressure, stress = change_in(solver, 5.0)
+    # A tight soil: what hangs above the table seeps into it by half a micrometre.
+    assert pressure < 500.0 and stress < 1000.0
+
+
+def test_water_that_hangs_above_the_table_seeps_into_it():
+    """Nothing holds water at zero pressure: it falls at the conductivity, and its pressure at the table spreads.
+
+    Source: Carslaw & Jaeger (1959), section 2.9: a plane source of constant strength in a medium without end.
+    """
+    column = Column(cells=40, size=0.5)
+    scene = column.scene()
+    scene = scene.model_copy(update={"water": scene.water.model_copy(update={"table_depth": 10.0})})
+    solver = mpm.Solver(scene, column.mesh(), threads=1)
+    time, weight = 5.0, 9.81 * scene.water.density
+    before = by_place(solver)[:, P]
+    change_in(solver, time)
+    points, soil = by_place(solver), scene.soils[0]
+    nu = soil.poissons_ratio
+    oedometric = soil.youngs_modulus * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
+    storage = soil.porosity / scene.water.bulk_modulus + 1 / oedometric
+    diffusivity = soil.hydraulic_conductivity / (weight * storage)
+    z, spread = np.abs(points[:, Y] + 10.0), np.sqrt(diffusivity * time)
+    rise = weight * (spread / np.sqrt(np.pi) * np.exp(-((z / spread / 2) ** 2)) - z / 2 * erfc(z / spread / 2))
+    near = z < 4.0
+    error = points[near, P] - before[near] - rise[near]
+    assert np.abs(error).max() < 0.01 * rise.max()

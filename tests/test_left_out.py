@@ -155,8 +155,9 @@ def test_undrained_scene_is_the_limit_of_falling_permeability():
     for column in range(3):
         assert np.abs(one.impulse[:, column] - two.impulse[:, column]).max() < 1e-6 * two.impulse[:, column].max()
     # at the gate two velocities are mapped with two weights (grains, volume) that differ with the porosity, and the
-    # water's remapped one slides along walls on which grains stick: differences of an element, 2e-4, 4e-5 and 8e-4
-    for columns, most in ((MOTION[2:4], 1e-3), (STRESS, 2e-4), ([P], 3e-3)):
+    # water's remapped one slides along walls on which grains stick: differences of an element beside the gate's corner,
+    # 6e-4, 2e-3 and 3e-4 (stress 4e-5 while volume changes were means over the elements around)
+    for columns, most in ((MOTION[2:4], 1e-3), (STRESS, 4e-3), ([P], 3e-3)):
         scale = np.abs(two.points[:, columns]).max()
         assert np.abs(one.points[:, columns] - two.points[:, columns]).max() < most * scale, columns
 
@@ -181,7 +182,7 @@ def test_wall_pushes_an_undrained_mixture_as_two_tied_phases():
         nodes, impulse, ledger = np.zeros((n, NODE_WIDTH)), np.zeros((n, 5)), np.zeros(len(LEDGER))
         numba.njit(error_model="numpy")(solve.py_func)(  # a kernel's part has no code of its own to call
             0, n, row, np.full(n, -1, np.int32), np.zeros(n, np.int8), 0, np.array([1e-3]),
-            np.ones((1, n), np.uint8), given, np.zeros((0, 6)), 9.81, 1000.0, np.zeros(n, np.int8), row,
+            np.ones((1, n), np.uint8), given, np.zeros((0, 6)), 9.81, np.zeros(n, np.int8), row,
             normal, np.ones(n, np.int8), np.full(n, 0.2), None, nodes, np.zeros(n, np.int8), impulse, ledger,
         )  # fmt: skip
         assert ledger[6] < 1e-12 * ledger[7]  # reactions explain the change of momentum

@@ -60,7 +60,7 @@ def test_example_of_the_documentation_is_a_model(example, written, tmp_path):
     assert np.abs(response["joint_rotation"]).max() < 1e-3 * np.abs(jointed["joint_rotation"]).max()
     result = gush("compare", written, "--second", "efficiency", "--json", "-")
     assert result.exit_code == 0, result.output
-    assert json.loads(result.output)["models"] == ["beam-spring", "efficiency"]
+    assert json.loads(result.stdout)["models"] == ["beam-spring", "efficiency"]
 
 
 def test_model_in_a_file_of_your_own_answers_on_the_command_line(example, written, tmp_path, monkeypatch):
@@ -75,7 +75,7 @@ def test_model_in_a_file_of_your_own_answers_on_the_command_line(example, writte
     np.testing.assert_array_equal(stored["bending_moment"], expected["bending_moment"])
     monkeypatch.setattr(models, "_REGISTERED", {})
     result = gush("compare", written, "--second", f"{file}:EfficiencyRing", "--json", "-")
-    assert json.loads(result.output)["models"] == ["beam-spring", "EfficiencyRing"]
+    assert json.loads(result.stdout)["models"] == ["beam-spring", "EfficiencyRing"]
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ import mpm
 import mpm.scene
 from mpm.contact import FIXED_X, FIXED_Y
 from mpm.lining import ElasticRing, RigidRing
-from mpm.variables import SXX, SXY, SYY, SZZ, VSX
+from mpm.variables import SXX, SXY, SYY, SZZ, V_SX, V_SY, VSX
 from mpm.wall import NODE_STATE, reaction_kernel
 from structure import theory
 
@@ -326,5 +326,5 @@ def test_ground_that_gushes_carries_the_velocity_of_the_wall():
     stuck = (solver.status & 2) > 0
     row = solver.contact_of_node[stuck]
     assert stuck.any() and np.abs(solver.wall).max() > 0
-    assert solver.nodes[stuck, 2:4] == pytest.approx(solver.wall[row], abs=1e-15)
+    assert solver.nodes[stuck, V_SX : V_SY + 1] == pytest.approx(solver.wall[row], abs=1e-15)
     assert np.isfinite(solver.points[:, VSX]).all()

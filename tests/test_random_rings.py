@@ -88,7 +88,9 @@ def sums(theta, pressure, shear):
 def random_balanced_loads(rng):
     """Pressures and shear of random harmonics at random angles, without resultants."""
     count = int(rng.integers(24, 400))
-    degrees = np.unique(rng.uniform(0, 360, count)) if rng.random() < 0.5 else np.arange(count) * 360 / count
+    # one angle in each of `count` equal parts, anywhere in it or at its beginning: no gap that is refused
+    within = rng.uniform(0, 1, count) if rng.random() < 0.5 else 0.0
+    degrees = (np.arange(count) + within) * 360 / count
     theta = np.radians(degrees)
     mean = rng.uniform(1e5, 5e5)
     size = rng.uniform(0, 0.15) * mean

@@ -116,6 +116,7 @@ def test_every_attribute_of_the_solver_is_stored_built_or_scratch(scene, mesh):
         "_begin_substeps",
         "_checked",
         "_near",
+        "_largest",
         "_reached",
     }
     assert begun == stored

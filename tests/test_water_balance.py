@@ -8,7 +8,7 @@ import coupling
 import mpm
 from mpm.scene import Scene
 from mpm.solver import Solver
-from mpm.variables import B_FLX, B_FLY, MASS, SXX, SXY, SYY, SZZ, N, P
+from mpm.variables import B_FLX, B_FLY, SXX, SXY, SYY, SZZ, N, P, X, Y
 
 
 def full_box(**numerics):
@@ -50,23 +50,32 @@ def test_filter_fills_dry_points_with_what_it_takes_from_wet_ones():
     assert abs(np.sum(weight * change)) < 1e-9 * np.sum(np.abs(weight * change))
 
 
-def test_water_is_not_driven_by_how_many_points_elements_hold():
+def test_filter_leaves_alone_what_points_on_a_line_can_not_tell():
     solver = full_box()
-    rng = np.random.default_rng(2)
-    share = rng.uniform(0.4, 1.6, len(solver.mesh.elements))  # of what fits
-    solver.points[:, MASS] *= share[solver.element_of_point]
+    rows, cell = solver.points, solver.element_of_point // 4
+    corners = solver.mesh.nodes[solver.mesh.elements[4 * cell, :2]]  # the first corner and the next, of four
+    across = solver.mesh.nodes[solver.mesh.elements[4 * cell + 2, 0]]
+    # those of two elements gather at one corner of the cell, those of the others at the corner opposite to it
+    near = np.where((solver.element_of_point % 4 % 3 == 0)[:, None], corners[:, 0], across)
+    rows[:, X : Y + 1] = near
+    rng = np.random.default_rng(1)
+    rows[:, P] = before = rng.uniform(1e4, 1e5, solver.n_points)
+    solver.step(1e-12)
+    assert np.isfinite(rows).all()
+    assert np.abs(rows[:, P] - before).max() < 1.0  # what moves in 1e-12 s
+
+
+def test_filter_moves_no_node():
+    """What it takes is nothing that a node feels: the forces of random pressures, before and after."""
+    solver = full_box(pressure_filter=1.0, stress_damping=0.0)
+    rng = np.random.default_rng(3)
+    rows = solver.points
+    rows[:, P] = 1e5 + 1e4 * rng.standard_normal(solver.n_points)
     solver.map_points()
-    x, y = solver.mesh.nodes.T
-    inside = (np.abs(x) < 0.85) & (np.abs(y + 0.5) < 0.35)
-    force = np.hypot(*solver.nodal_sums()[inside][:, [B_FLX, B_FLY]].T)
-    # with the volume of each element's own points the same uniform pressure would push by this
-    g, own = solver.geometry, 1e5 * share * solver.geometry[:, 6]
-    unsmoothed = np.zeros((len(x), 2))
-    for corner, gx, gy in ((0, -g[:, 0] - g[:, 2], -g[:, 1] - g[:, 3]), (1, g[:, 0], g[:, 1]), (2, g[:, 2], g[:, 3])):
-        np.add.at(unsmoothed, solver.mesh.elements[:, corner], np.column_stack([own * gx, own * gy]))
-    pushed = np.hypot(*unsmoothed[inside].T)
-    # a third of the mean over six elements is what is left of random fillings
-    assert np.sqrt(np.mean(force**2)) < 0.45 * np.sqrt(np.mean(pushed**2))
+    force, before = solver.nodal_sums()[:, [B_FLX, B_FLY]], rows[:, P].copy()
+    solver.step(1e-12)
+    assert np.abs(rows[:, P] - before).max() > 1e3
+    assert np.abs(solver.nodal_sums()[:, [B_FLX, B_FLY]] - force).max() < 1e-8 * np.abs(force).max()
 
 
 @pytest.fixture(scope="module")

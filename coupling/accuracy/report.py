@@ -20,15 +20,11 @@ READING = """
 - **`courant = 0.8`.** Shorter steps make flight, sliding and the active wall more accurate, all below half a percent
   anyway, and nothing else; 0.2 costs four times as much. Waves are even better with 1.0, the sliding block three
   times worse.
-- **`pressure_filter = 0.4`.** Without it consolidation errs by 1.3 % of the load instead of 0.1 %, radial seepage by
-  2 % instead of 0.4 %. Between 0.1 and 0.4 nothing changes, so it is no diffusion.
-- **`volumetric_smoothing`** lets bearing capacity come down to Prandtl's (1.9 % instead of 6.8 %) and sand out of a
-  slot (12 % instead of 23 %); waves would rather do without (0.5 % instead of 0.7 %).
-- **`pic_rate = 10`** per second is best for the collapse of sand; 100 more than doubles its error and that of the slot,
-  but splashing water would rather have 100. It costs nothing either way.
-- **`remapping`** (MUSL). Without it the answers are the same where velocities are smooth (waves 10 to 25 % less exact,
-  since solved velocities damp them), but the critical step is the shorter the less mass a node has: twice the steps in
-  columns, five times in flows, and a block that slides along a floor stops with the reason. It is on no front.
+- **`pressure_filter`** takes out only what no node feels: forces, flow and the water in an element are the same before
+  and after. What it is for is the pressure that points bring along into other elements.
+- **`stress_damping`** is a viscosity whose time vanishes with the mesh: it takes the flutter of flow without dilatancy,
+  and costs a factor of sqrt(1 + 2 `stress_damping`) in the critical step.
+- **`pic_rate`** is the only choice that draws velocities together; the tables of the flows say what it costs there.
 - **The lining's motion** (`lining = "floating"`, `"elastic"`) is no numerical choice where the ring is lighter than the
   ground or gives way: another answer, whose size and cost in case 3 stand in [lining-in-mpm.md](lining-in-mpm.md).
   At rest, with the weight of the ground it stands for and as stiff as a scene may ask, a ring keeps the pressures of a

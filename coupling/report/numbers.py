@@ -5,8 +5,20 @@ from typing import NamedTuple
 import numpy as np
 
 from coupling.datasets import HISTORY, structure_group
+from coupling.quality import ERRORS, STATES
 from coupling.report.series import match_times, model_names, tunnels_beside
 from coupling.summary import PLACES
+from mpm.variables import CLAMPS
+
+#: What it means that points meet a limit, by its name in :data:`mpm.variables.CLAMPS`.
+MEANINGS = {
+    "tension": "grains that are not pressed together bear no tension",
+    "suspended": "looser than the loose porosity they do not touch and bear no stress",
+    "cavitated": "water that is missing does not pull",
+    "porosity_floor": "held there; no sound run reaches it",
+    "porosity_ceiling": "held there; no sound run reaches it",
+    "returned_to_mesh": "they would have left the mesh within a step",
+}
 
 #: Variable and which extreme of it: (label, unit shown, factor from SI).
 RING_EXTREMES = {
@@ -21,8 +33,6 @@ RING_EXTREMES = {
     "convergence_horizontal": ("horizontal diameter shorter (+) or longer (−)", "mm", 1e3),
     "convergence_vertical": ("vertical diameter shorter (+) or longer (−)", "mm", 1e3),
 }
-RESIDUAL_LIMIT = 1e-6  # of the loads; the ring's iteration stops well below
-MASS_LIMIT = 1e-9  # relative; grains are only moved, so round-off is all that may show
 SHEAR_LIMIT = 0.05  # of the largest Q; the slope of M is taken over one element
 THEORY_LIMIT = 0.02  # of the mean pressure; an element at the lining sees the depth of its middle
 
@@ -245,11 +255,13 @@ def quality(run, summary, scene=None):
 
     Returns
     -------
-    list of (str, str, bool or None)
-        What, how much, and whether it is within what is expected; None where nothing is expected of it.
+    list of (str, str, str, bool or None)
+        What, how much, and its verdict: a word of :data:`coupling.quality.ERRORS`, or whether it is within what is
+        expected; None where nothing is expected of it.
     """
-    rows = [("mass of the grains, largest relative change", f"{summary['grain_mass_error']:.1e}",
-             summary["grain_mass_error"] <= MASS_LIMIT)]  # fmt: skip
+    values = summary["quality"]
+    rows = [(ERRORS[name].label, ERRORS[name].text(values[name]), verdict)
+            for name, verdict in summary["verdicts"].items()]  # fmt: skip
     rows += _against_theory(run["lining"].to_dataset(), scene)
     answers = [(model, k) for k in (None, *tunnels_beside(run)) for model in model_names(run, k)]
     for model, tunnel in answers:
@@ -260,14 +272,14 @@ def quality(run, summary, scene=None):
         if "equilibrium_residual" in response:
             worst = float(np.abs(response["equilibrium_residual"]).max())
             rows.append((f"equilibrium of the ring, {name}: largest unbalanced share", f"{worst:.1e}",
-                         worst <= RESIDUAL_LIMIT))  # fmt: skip
+                         ERRORS["lining_equilibrium"].verdict(worst)))  # fmt: skip
         if "shear_moment_residual" in response:
             share = float(np.abs(response["shear_moment_residual"]).max() / np.nanmax(np.abs(response["shear_force"])))
             rows.append((f"Q = -dM/ds, {name}: largest departure over the largest Q", f"{share:.1e}",
                          share <= SHEAR_LIMIT))  # fmt: skip
-    for name, count in summary["clamps"].items():
-        share = 100 * count / max(summary["point_steps"], 1)
-        rows.append((f"limit '{name.replace('_', ' ')}' acted", f"{count} times, {share:.2g} % of the updates", None))
+    points = {clamp: f"{values[name]:.1%} of points at most, " for name, clamp in STATES.items() if name in values}
+    rows += [(f"{label}: {MEANINGS[name]}", f"{points.get(name, '')}{values['clamps'][name]:.2%} of point-steps", None)
+             for name, label in CLAMPS.items()]  # fmt: skip
     for name, variable in run["history"].to_dataset().data_vars.items():
         if name not in HISTORY and variable.dims == ("time",):
             worst, unit = float(np.abs(variable).max()), variable.attrs.get("units", "")
@@ -298,7 +310,11 @@ def warnings(run, attributes, quality_rows):
     if attributes["status"] != "finished":
         message = attributes.get("status_message") or "the page shows what was computed until then"
         found.append(f"The run is '{attributes['status']}': {message}.")
-    found += [f"Outside what is expected: {what}: {value}." for what, value, good in quality_rows if good is False]
+    remedies = {judged.label: f"; {judged.remedy}" for judged in ERRORS.values()}
+    found += [
+        f"Outside what is expected: {what}: {value}{remedies.get(what, '')}."
+        for what, value, good in quality_rows if good in (False, "poor")
+    ]  # fmt: skip
     lining = run["lining"].to_dataset()
     records = lining.sizes["time"]
     models = model_names(run)

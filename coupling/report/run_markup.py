@@ -4,7 +4,7 @@ from html import escape
 
 from coupling.report.frame import duration, figure, header, provenance, rows_of_facts, shown
 
-VERDICTS = {True: "as expected", False: "look at this", None: "–"}
+VERDICTS = {True: "as expected", False: "look at this", None: "–", "poor": "poor: look at this"}
 MODEL_QUESTION = "Lining models side by side"
 RING_CHARTS = (
     ("soil_pressure", "Effective soil pressure", "kPa"),
@@ -139,8 +139,9 @@ space plays.</p>
 
 def _quality(data):
     rows = "".join(
-        f'<tr class="{"bad" if good is False else ""}"><th scope="row">{escape(what)}</th><td>{escape(value)}</td>'
-        f"<td>{VERDICTS[good]}</td></tr>"
+        f'<tr class="{"bad" if good in (False, "poor") else ""}"><th scope="row">{escape(what)}</th>'
+        f"<td>{escape(value)}</td>"
+        f"<td>{VERDICTS.get(good, good)}</td></tr>"
         for what, value, good in data["quality"]
     )
     return f"""<section aria-labelledby="quality">

@@ -2,7 +2,7 @@
 
 from html import escape
 
-from coupling.quality import LABELS
+from coupling.quality import ERRORS
 from coupling.report.frame import duration, figure, header, provenance, rows_of_facts, scroll, shown
 from coupling.report.run_markup import RING_CHARTS
 from coupling.studies.design import short_names, value_text
@@ -221,13 +221,13 @@ def _trust(cases):
     finished = [case for case in cases if case["status"] == "finished"]
     if not finished:
         return ""
-    names = [name for name in LABELS if any(name in case["balances"] for case in finished)]
+    names = [name for name in ERRORS if any(name in case["balances"] for case in finished)]
     heads = "".join(
-        [_sortable("case"), *(_sortable(LABELS[name][0]) for name in names), '<th scope="col">warnings</th>']
+        [_sortable("case"), *(_sortable(ERRORS[name].label) for name in names), '<th scope="col">warnings</th>']
     )
     rows = ""
     for case in finished:
-        cells = "".join(_cell(case["balances"].get(name), form=LABELS[name][1].format) for name in names)
+        cells = "".join(_cell(case["balances"].get(name), form=ERRORS[name].form.format) for name in names)
         told = "".join(f"<li>{escape(text)}</li>" for text in case["warnings"])
         rows += (
             f'<tr data-trust="{case["number"]}"><th scope="row" data-value="{case["number"]}">'
@@ -236,7 +236,7 @@ def _trust(cases):
     table = f"<thead><tr>{heads}</tr></thead><tbody>{rows}</tbody>"
     return f"""<section aria-labelledby="trust">
 <h2 id="trust">Balances and warnings</h2>
-<p class="about">Largest errors of a case by its own account: changes of mass over the initial mass; departures of
-momentum, energy and contact over what drives them; shares of points; unbalanced force of the ring over its loads.</p>
+<p class="about">Largest errors of a case by its own account: water, momentum, energy, overlap over those of what flows;
+grain mass over the initial; unbalanced force of the ring over its loads. A poor one is among the warnings.</p>
 {scroll("trust", f'<table class="numbers cases sortable">{table}</table>', tall=len(finished) > 15)}
 </section>"""

@@ -33,9 +33,11 @@ def collapse(cells=10, duration=1.0, conductivity=1e-4, **numerics):
             monitor.step(duration - solver.time)
     monitor.check()
     measures, balances = monitor.measures(), solver.balances()
+    water = solver.initial["water"]
+    impulse = scene.gravity * (solver.initial_grain_mass + water) * solver.time
     parts = {
-        "grains": measures["mass_error"], "water": abs(balances["water_mass_error"]),
-        "momentum": balances["momentum_error"], "energy_created": measures["energy_created"],
+        "grains": measures["mass_error"], "water": abs(balances["water_missing"]) / water,
+        "momentum": balances["momentum_departure"] / impulse, "energy_created": measures["energy_created"],
     }  # fmt: skip
     return Result(
         error=float(max(parts.values())), values={name: float(value) for name, value in parts.items()},

@@ -6,7 +6,7 @@ from mpm.contact import FIXED_X, FIXED_Y
 from mpm.long_step import ADVANCE, FOLLOW, PLAN, REMAP, SOLVE, UPDATE
 from mpm.scene import Scene
 from mpm.solver import Solver
-from mpm.variables import V_DLX, V_DLY, V_DSX, V_DSY, V_LX, V_LY, V_MS, V_SX, V_SY
+from mpm.variables import B_D, V_DLX, V_DLY, V_DSX, V_DSY, V_LX, V_LY, V_ML, V_MS, V_SX, V_SY
 
 
 class DrivenSolver(Solver):
@@ -66,6 +66,11 @@ class DrivenSolver(Solver):
         self.reaction[:] = mass * jump / dt
         velocity += jump
         change += jump
+        if self.scene.is_two_phase and jump.any():  # drag is implicit: grains that are driven take the water along
+            drag = dt * self.nodal_sums()[:, B_D : B_D + 1]
+            jump *= drag / np.where(full, row[:, V_ML : V_ML + 1] + drag, 1.0)
+            row[:, V_LX : V_LY + 1] += jump
+            row[:, V_DLX : V_DLY + 1] += jump
         moved = self.driven_liquid & full
         jump = np.where(moved, self.velocity_liquid - row[:, V_LX : V_LY + 1], 0.0)
         row[:, V_LX : V_LY + 1] += jump

@@ -17,8 +17,8 @@ def front(x, gap):
     return float(x[wide[0]] if len(wide) else x[-1])
 
 
-def depth_profile(solver, x):
-    """Depth of the material at the grid lines `x` [m], and the share of it that overlaps.
+def patches(solver):
+    """Area of the patch of each node, volume of the points in it, and how much of that it can hold [m2].
 
     The patch of a node cannot hold more than a third of its elements' area: what the points' volumes, shared among
     the corners of their elements, add up to beyond it has run into itself. Patches, since three points an element
@@ -34,10 +34,22 @@ def depth_profile(solver, x):
     count = len(mesh.nodes)
     volume = np.bincount(mesh.elements[element].ravel(), share.ravel(), count)
     area = np.bincount(mesh.elements.ravel(), np.repeat(geometry[:, 6] / 3, 3), count)
-    held = np.minimum(volume, area)
-    line = np.searchsorted(x, mesh.nodes[:, 0] - 1e-9)
-    width = np.bincount(line, area, len(x)) / np.ptp(mesh.nodes[:, 1])
-    return np.bincount(line, held, len(x)) / width, float(1 - held.sum() / volume.sum())
+    return area, volume, np.minimum(volume, area)
+
+
+def overlap(solver, above=-np.inf):
+    """Share of the points' volume above a height [m] that has run into itself [-]."""
+    _, volume, held = patches(solver)
+    here = solver.mesh.nodes[:, 1] > above
+    return float(1 - held[here].sum() / volume[here].sum())
+
+
+def depth_profile(solver, x):
+    """Depth of the material at the grid lines `x` [m]."""
+    area, _, held = patches(solver)
+    line = np.searchsorted(x, solver.mesh.nodes[:, 0] - 1e-9)
+    width = np.bincount(line, area, len(x)) / np.ptp(solver.mesh.nodes[:, 1])
+    return np.bincount(line, held, len(x)) / width
 
 
 def lube_run_out(aspect):
@@ -79,7 +91,7 @@ def column_collapse(
         while solver.time < end:
             solver.step(end - solver.time)
     run_out = front(solver.points[:, X], size) - 1
-    depth, overlap = depth_profile(solver, x)
+    depth = depth_profile(solver, x)
     height = float(depth[0])
     speed = np.sqrt(np.average(np.sum(solver.points[:, VSX : VSY + 1] ** 2, axis=1), weights=solver.points[:, MASS]))
     return Result(
@@ -87,24 +99,24 @@ def column_collapse(
         values={
             "run_out": run_out, "run_out_lube": lube_run_out(aspect), "height": height,
             "height_lube": lube_height(aspect),
-            "late_speed": float(speed / np.sqrt(gravity * aspect)), "overlap": overlap,
+            "late_speed": float(speed / np.sqrt(gravity * aspect)), "overlap": overlap(solver),
         },
         steps=solver.step_count, points=solver.n_points, cpu_seconds=watch.seconds,
     )  # fmt: skip
 
 
-def water(name, mesh, size, width, depth, **numerics):
+def water(name, mesh, size, width, depth, modulus=1e6, **numerics):
     """A solver of water alone: a suspension of grains as heavy as water, too loose to touch, tied to it by drag.
 
     The solver has no phase without grains; these take 11 % of the volume, carry no stress and follow the water, so
-    the mixture moves as one inviscid fluid. Bulk modulus 1 MPa: speed of sound 33 m/s, slow against no flow here.
+    the mixture moves as one inviscid fluid. Bulk modulus 1 MPa: speed of sound 33 m/s, no flow here is faster.
     """
     loose, porosity = 0.875, 0.89
     soil = {
         "model": "elastic", "youngs_modulus": 1e4, "poissons_ratio": 0.0, "porosity": 0.87, "loose_porosity": loose,
         "grain_density": 1000.1, "hydraulic_conductivity": 1e-4, "k0": 1.0,
     }  # fmt: skip
-    scene = box_scene(name, size, width, depth, soil, {"bulk_modulus": 1e6}, **numerics)
+    scene = box_scene(name, size, width, depth, soil, {"bulk_modulus": modulus}, **numerics)
     solver = Solver(scene, mesh, threads=1)
     solver.points[:, MASS] *= (1 - porosity) / (1 - solver.points[:, N])
     solver.points[:, N] = porosity
@@ -136,7 +148,7 @@ def dam_break(cells=10, times=4.0, **numerics):
         while solver.time < end:
             solver.step(end - solver.time)
     edges = np.arange(-behind, before + 1) * size
-    depth, overlap = depth_profile(solver, edges)
+    depth = depth_profile(solver, edges)
     exact = ritter_depth(edges, end, 1.0, gravity)
     wave = np.abs(edges) < 2 * times
     tip = front(solver.points[:, X], size)
@@ -144,7 +156,7 @@ def dam_break(cells=10, times=4.0, **numerics):
         error=float(np.abs(depth - exact)[wave].sum() / exact[wave & (edges > -times)].sum()),
         values={
             "front": tip / (2 * times), "depth_at_dam": float(depth[behind]),
-            "volume": float(np.trapezoid(depth, edges) / behind * cells), "overlap": overlap,
+            "volume": float(np.trapezoid(depth, edges) / behind * cells), "overlap": overlap(solver),
         },
         steps=solver.step_count, points=solver.n_points, cpu_seconds=watch.seconds,
     )  # fmt: skip
@@ -172,10 +184,9 @@ def water_column(cells=10, **numerics):
             while solver.time < end:
                 solver.step(end - solver.time)
             fronts.append(front(solver.points[:, X], size))
-    _, overlap = depth_profile(solver, np.arange(7 * cells + 1) * size)
     error = np.abs(np.array(fronts) - MARTIN_MOYCE[:, 1]) / (MARTIN_MOYCE[-1, 1] - 1)
     return Result(
-        error=float(error.mean()), values={"last_front": fronts[-1], "overlap": overlap},
+        error=float(error.mean()), values={"last_front": fronts[-1], "overlap": overlap(solver)},
         steps=solver.step_count, points=solver.n_points, cpu_seconds=watch.seconds,
     )  # fmt: skip
 

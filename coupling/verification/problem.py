@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 #: Modules of this package that register problems when they are imported.
-FAMILIES = ("columns", "waves", "motion", "conservation", "plasticity", "flows", "earth_pressure", "openings")
+FAMILIES = ("columns", "waves", "motion", "conservation", "plasticity", "flows", "earth_pressure", "openings", "slots")
 
 #: Numerical choices that a problem hands through to its scene, and the values that its ladder goes through.
 NUMERICS = {
