@@ -22,7 +22,7 @@ RING: Usual = {
     "inner_diameter": (0.5, 25, "m", LENGTH),
     "concrete_modulus": (1e9, 5e11, "Pa", PRESSURE),
     "concrete_unit_weight": (1e3, 2e5, "N/m3", {"kN/m3": 1e3}),
-    "joint_rotational_stiffness": (1e6, 1e12, "N m/rad", FORCE),
+    "joint_rotational_stiffness": (1e6, 1e13, "N m/rad", FORCE),
     "joint_normal_stiffness": (1e6, 1e13, "N/m", FORCE),
     "joint_shear_stiffness": (1e6, 1e13, "N/m", FORCE),
     "joint_friction_coefficient": (0.02, 2, "as a ratio", PERCENT),
