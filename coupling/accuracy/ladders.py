@@ -14,8 +14,8 @@ COUNTS = ("cells", "elements", "columns", "rows", "across", "steps", "increments
 SIZES = ("size", "element_size", "spacing", "courant", "dt", "time_step")
 #: Settings of verification problems that pose another problem.
 POSED = (
-    "aspect", "conductivity", "duration", "friction", "height", "inertia", "periods", "rough", "rough_base",
-    "settlement", "slope", "stiffness", "strain", "time_factor", "times", "turn", "cover", "release", "mode",
+    "aspect", "conductivity", "duration", "friction", "height", "inertia", "periods", "repose", "rough", "rough_base",
+    "settlement", "share", "slope", "stiffness", "strain", "time_factor", "times", "turn", "cover", "release", "mode",
 )  # fmt: skip
 #: Errors at or below this are round-off: nothing can be gained there.
 ROUND_OFF = 1e-12

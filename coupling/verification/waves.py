@@ -106,6 +106,7 @@ def bar(cells=20, periods=5.0, **numerics):
     )  # fmt: skip
 
 
+# The slow wave has stiff water: its own weight compresses soft water by 0.1 %, which linear waves do not know.
 #: Without what damps: what is measured is the wave. `damped-bar` measures the damping.
 FREE = {"stress_damping": 0.0, "pic_rate": 0.0}
 LADDER = {"cells": (5, 10, 20, 40), **NUMERICS, **WET, "bulk_modulus": (8e7, 2.2e9)}
@@ -134,7 +135,7 @@ for name, title, fast, limit, why in (
     ("fast-wave", "fast wave, grains and water in phase, almost without drag",
      {"conductivity": 1.0, "mode": "fast"}, 0.015, TOO_SLOW),
     ("slow-wave", "slow wave, grains against water, almost without drag",
-     {"conductivity": 10.0, "mode": "slow"}, 0.015, TOO_SLOW),
+     {"conductivity": 10.0, "mode": "slow", "bulk_modulus": 2.2e9}, 0.015, TOO_SLOW),
     ("damped-wave", "both waves together, damped by drag",
      {"conductivity": 2e-2, "mode": "together"}, 0.015, TOO_SLOW),
 ):  # fmt: skip
