@@ -206,8 +206,8 @@ register(Problem(
         "repose": (28.0, 31.0, 34.0), "stiffness": (100.0, 300.0, 1000.0),
     },
     limit=0.25,
-    why="one fit for sand, rice and sugar alike: no friction angle enters; 31 degrees of internal friction instead of 37 "
-    "(31 on slip planes) lengthen the run-out by 15 %",
+    why="one fit for sand, rice and sugar alike: no friction angle enters; 31 degrees of internal friction instead of "
+    "37 (31 on slip planes) lengthen the run-out by 15 %",
 ))  # fmt: skip
 
 register(Problem(
