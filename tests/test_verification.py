@@ -61,6 +61,29 @@ def test_damping_of_the_stress_costs_what_kelvin_and_voigt_say():
     assert errors[0] / errors[1] > 3.0  # second order, as without it
 
 
+def test_saturated_ground_rests_below_its_bearing_capacity_and_fails_above():
+    solve = problems()["footing-at-rest"].solve
+    below, pulled, above = (solve(cells=4, bulk_modulus=2e8, share=share).error for share in (0.95, -0.9, 1.05))
+    assert max(below, pulled) < 2e-3  # an elastic vibration
+    assert above > 0.1  # it goes on
+
+
+def test_sand_leaves_a_slot_steadily_and_does_not_run_into_itself():
+    values = problems()["slot-outflow"].solve(cells=8).values
+    assert values["unsteadiness"] < 0.08  # 5 % with 16 elements; ten elements fall out in each interval
+    assert values["overlap"] < 0.03
+
+
+@pytest.mark.parametrize(("points", "most"), [(3, 0.03), (12, 0.01)])
+def test_a_tank_does_not_lose_the_volume_of_its_water(points, most):
+    assert abs(problems()["tank"].solve(cells=2, points=points).values["volume_lost"]) < most
+
+
+def test_seepage_to_a_well_converges_at_second_order():
+    errors = [problems()["well"].solve(sectors=n).error for n in (5, 10)]
+    assert errors[0] / errors[1] > 3.0
+
+
 @pytest.mark.parametrize("problem", ["dam-break", "water-column", "column-collapse"])
 def test_what_flows_does_not_run_into_itself(problem):
     # 12 points an element as around a gate: 2 to 4 % measured; with 3 points it is 11 to 17 %, which is no small error

@@ -9,10 +9,11 @@ import numpy as np
 
 from coupling.verification.boxes import box_mesh
 from coupling.verification.driven import DrivenSolver, box_scene
-from coupling.verification.problem import NUMERICS, Problem, Result, Stopwatch, register
+from coupling.verification.problem import NUMERICS, WET, Problem, Result, Stopwatch, register
 from mpm.contact import FIXED_X, FIXED_Y
-from mpm.variables import MASS
+from mpm.variables import MASS, SXX, SYY, SZZ, Y0, P, Y
 
+COHESION = 1e4  # of the ground under a footing [Pa]
 LATE = 0.2  # share of the path at its end over which the load is averaged
 
 
@@ -79,17 +80,13 @@ def bearing_capacity_factor(friction_angle):
     return (np.exp(np.pi * np.tan(phi)) * np.tan(np.pi / 4 + phi / 2) ** 2 - 1) / np.tan(phi)
 
 
-def footing(
-    cells=8, friction_angle=0.0, rough=True, settlement=0.0025, stiffness=20000.0, duration=0.25, damping=0.0,
-    **numerics,
-):  # fmt: skip
-    """Press half a strip footing into weightless soil: `cells` elements, 1 m, and half an element.
+def footing_solver(cells, friction_angle, stiffness, bulk_modulus, damping, **numerics):
+    """Half a strip footing on weightless soil, 1 m in `cells` elements: (solver, nodes under it, size of the spiral).
 
-    The velocity of the outermost node falls to zero over an element; half of it counts as width, as usual. Without
-    friction Prandtl's mechanism is 1.41 m deep and 3 m wide; with it the log spiral makes both larger.
-    stiffness : Young's modulus over cohesion, times N_c over 2 + pi [-];  duration : times the size of the spiral [s].
+    bulk_modulus : of the water of undrained saturated soil [Pa], None: dry. It is under a pressure that effective
+    tension balances, so that it does not cavitate where the ground dilates.
     """
-    size, cohesion, exact = 1.0 / cells, 1e4, bearing_capacity_factor(friction_angle)
+    size, cohesion, exact = 1.0 / cells, COHESION, bearing_capacity_factor(friction_angle)
     phi = np.radians(friction_angle)
     spiral = np.exp(0.5 * np.pi * np.tan(phi)) * np.tan(np.pi / 4 + phi / 2)
     depth, width = 0.6 + 1.4 * spiral, 1.5 + 2 * spiral
@@ -98,18 +95,67 @@ def footing(
         "cohesion": cohesion, "friction_angle": friction_angle, "dilatancy_angle": friction_angle,
         "tensile_strength": 1e8, "youngs_modulus": stiffness * cohesion * exact / (2 + np.pi), "k0": 1.0,
     }  # fmt: skip
-    solver = DrivenSolver(box_scene("footing", size, width, depth, soil, gravity=0.0, **numerics), mesh, damping)
+    water = None if bulk_modulus is None else {"bulk_modulus": bulk_modulus, "drainage": "undrained"}
+    solver = DrivenSolver(box_scene("footing", size, width, depth, soil, water, gravity=0.0, **numerics), mesh, damping)
+    if water is not None:
+        solver.points[:, P] = 20 * cohesion
+        solver.points[:, [SXX, SYY, SZZ]] = 20 * cohesion
     under = np.flatnonzero((np.abs(mesh.nodes[:, 1]) < 1e-9) & (mesh.nodes[:, 0] < 1 + 1e-9))
+    return solver, under, spiral
+
+
+def footing(
+    cells=8, friction_angle=0.0, rough=True, settlement=0.0025, stiffness=20000.0, duration=0.25, damping=0.0,
+    bulk_modulus=None, **numerics,
+):  # fmt: skip
+    """Press half a strip footing into weightless soil: `cells` elements, 1 m, and half an element.
+
+    The velocity of the outermost node falls to zero over an element; half of it counts as width, as usual. Without
+    friction Prandtl's mechanism is 1.41 m deep and 3 m wide; with it the log spiral makes both larger.
+    stiffness : Young's modulus over cohesion, times N_c over 2 + pi [-];  duration : times the size of the spiral [s].
+    """
+    exact = bearing_capacity_factor(friction_angle)
+    solver, under, spiral = footing_solver(cells, friction_angle, stiffness, bulk_modulus, damping, **numerics)
     solver.driven[under, 0] = rough
     load, trend, seconds = load_path(solver, duration * spiral, under, 1, -settlement / (duration * spiral))
-    factor = -load / (cohesion * (1 + size / 2))
+    factor = -load / (COHESION * (1 + 0.5 / cells))
     return Result(
         error=float(abs(factor / exact - 1)),
         values={
             "bearing_capacity_factor": float(factor), "exact": float(exact),
-            "over_nodes_only": float(factor * (1 + size / 2)), "trend": float(trend),
+            "over_nodes_only": float(factor * (1 + 0.5 / cells)), "trend": float(trend),
         },
         steps=solver.step_count, points=solver.n_points, cpu_seconds=seconds,
+    )  # fmt: skip
+
+
+def loaded_footing(
+    cells=8, share=0.9, stiffness=20000.0, duration=1.0, damping=0.0, bulk_modulus=None, **numerics,
+):  # fmt: skip
+    """Load the ground by `share` of its bearing capacity, spread evenly on 1 m, and wait: it must come to rest.
+
+    A negative share is the pressure that is missing where ground is pressed into a gap.
+
+    Reference: a statically admissible load below the limit, at which a perfectly plastic body stands still. Evenly: a
+    load that goes on to the middle of the next element punches its outermost nodes through at 0.9 already.
+    """
+    solver, under, _ = footing_solver(cells, 0.0, stiffness, bulk_modulus, damping, **numerics)
+    length = np.where(np.abs(solver.mesh.nodes[under, 0] - 0.5) > 0.5 - 1e-9, 0.5, 1.0) / cells  # of a pressure on 1 m
+    top = solver.points[:, Y] > -1.0 / cells
+    settled, times = [], []
+    with Stopwatch() as watch:
+        while solver.time < duration:
+            ramp = min(1.0, 5 * solver.time / duration)
+            solver.force[under, 1] = -ramp * share * (2 + np.pi) * COHESION * length
+            solver.step(duration - solver.time)
+            settled.append(float(np.abs(solver.points[top, Y0] - solver.points[top, Y]).max()))
+            times.append(solver.time)
+    settled, times = np.array(settled), np.array(times)
+    first, last = (settled[(times > a * duration) & (times <= (a + 0.1) * duration)].mean() for a in (0.5, 0.9))
+    return Result(
+        error=float(abs(last / first - 1)),
+        values={"settlement": float(last), "elastic": float(last * stiffness / (2 + np.pi))},
+        steps=solver.step_count, points=solver.n_points, cpu_seconds=watch.seconds,
     )  # fmt: skip
 
 
@@ -147,4 +193,21 @@ register(Problem(
     limit=0.01,
     why="first order, from below since half an element beside the edge counts as width: 3, 1.7, 0.8, 0.4 % with 2, 4, "
     "8, 16 elements",
+))  # fmt: skip
+
+register(Problem(
+    name="undrained-footing", title="bearing capacity of saturated ground that does not drain",
+    source="Prandtl (1920): N_c = 2 + pi", norm="N_c over 2 + pi less 1, mean over the last fifth of the path",
+    solve=footing, fast={"cells": 8, "bulk_modulus": 2e8},
+    ladder={"cells": (2, 4, 8, 16), **NUMERICS, **WET, "bulk_modulus": (2e7, 2e8)},
+    limit=0.01, why="as of dry ground: crossed quadrilaterals do not lock at constant volume",
+))  # fmt: skip
+
+register(Problem(
+    name="footing-at-rest", title="saturated ground under nine tenths of its bearing capacity comes to rest",
+    source="lower bound theorem; Prandtl (1920): N_c = 2 + pi",
+    norm="settlement in the last tenth of the run over that at its half, less 1", solve=loaded_footing,
+    fast={"cells": 8, "bulk_modulus": 2e8, "share": 0.9},
+    ladder={"cells": (4, 8, 16), **NUMERICS, **WET, "share": (-0.9, 0.5, 0.95), "damping": (0.0, 0.3)},
+    limit=2e-3, why="an elastic vibration of the ground is left",
 ))  # fmt: skip
