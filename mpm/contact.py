@@ -86,8 +86,7 @@ def stop_rows(i, next_row, nodes, mean):
 @kernel_part
 def solve_nodes(
     first, last, which, next_row, level_of_row, begun, dt_of_level, touched, sums, mean, gravity, fixed,
-    contact_of_node,
-    normal, active, friction, wall, nodes, status, impulse, ledger,
+    contact_of_node, normal, active, friction, wall, nodes, status, impulse, ledger,
 ):  # fmt: skip
     """Add up the parts of a range of nodes and advance both phases by the time step of each node's finest level.
 
@@ -265,8 +264,8 @@ def one_velocity_kernel(undrained):
 
     @kernel_part
     def solve_one_velocity(
-        first, last, which, next_row, level_of_row, begun, dt_of_level, touched, sums, mean, gravity,
-        fixed, contact_of_node, normal, active, friction, wall, nodes, status, impulse, ledger,
+        first, last, which, next_row, level_of_row, begun, dt_of_level, touched, sums, mean, gravity, fixed,
+        contact_of_node, normal, active, friction, wall, nodes, status, impulse, ledger,
     ):  # fmt: skip
         """`solve_nodes` with one momentum equation a node: of the grains, or undrained, of the mixture.
 

@@ -1,6 +1,6 @@
 """Levels of local time stepping: elements grouped by powers of two of their own time step.
 
-The elements of a level are a mesh of their own with its own nodal sums, projected pressure and mean rates. Where levels
+The elements of a level are a mesh of their own with its own nodal sums. Where levels
 meet, a node has one *row* a level, and the rows are tied: they share mass, forces and velocity. The node takes the step
 of its finest level. A coarser row's forces stay as they were at the beginning of its own, longer step, its momentum
 follows the node's velocity, and its points are moved at the end by what the node did in all of its steps. The forces of
@@ -40,10 +40,7 @@ class Levels:
     of_row : (n_rows,) int8
     nodes : (n_nodes,) int32
         Nodes by their finest level, and in a level by the first element that they belong to, `first_of_node`;
-        `node_cuts` (n_levels + 1,) says where each level begins.
-    row_order : (n_rows,) int32
-        Rows by level and first element, with `first_of_row` and `row_cuts`; `element_cuts` (n_levels + 1,) does so for
-        elements.
+        `node_cuts` (n_levels + 1,) says where each level begins; `element_cuts` does so for elements.
     """
 
     of_element: NDArray[np.int8]
@@ -54,9 +51,6 @@ class Levels:
     nodes: NDArray[np.int32]
     first_of_node: NDArray[np.int32]
     node_cuts: NDArray[np.int64]
-    row_order: NDArray[np.int32]
-    first_of_row: NDArray[np.int32]
-    row_cuts: NDArray[np.int64]
     element_cuts: NDArray[np.int64]
 
     @property
@@ -166,9 +160,12 @@ def tie(elements, n_nodes, level):
     number = np.full((n_nodes, count), -1, np.int32)
     number[node, of_pair] = row
     row_of_corner = np.ascontiguousarray(number[elements, level[:, None]])
-    first_element = np.full(n_rows, len(elements), np.int32)
-    np.minimum.at(first_element, row_of_corner.ravel(), np.repeat(np.arange(len(elements), dtype=np.int32), 3))
-    nodes, rows = (np.lexsort((first_element[:k], of_row[:k])) for k in (n_nodes, n_rows))
+    first_element = np.full(n_nodes, len(elements), np.int32)
+    own = row_of_corner < n_nodes
+    np.minimum.at(
+        first_element, row_of_corner[own], np.repeat(np.arange(len(elements), dtype=np.int32), 3)[own.ravel()]
+    )
+    nodes = np.lexsort((first_element, of_row[:n_nodes]))
     edges = np.arange(count + 1)
     return Levels(
         of_element=np.ascontiguousarray(level, np.int8),
@@ -179,8 +176,5 @@ def tie(elements, n_nodes, level):
         nodes=nodes.astype(np.int32),
         first_of_node=first_element[nodes],
         node_cuts=np.searchsorted(of_row[:n_nodes][nodes], edges),
-        row_order=rows.astype(np.int32),
-        first_of_row=first_element[rows],
-        row_cuts=np.searchsorted(of_row[rows], edges),
         element_cuts=np.searchsorted(level, edges),
     )

@@ -32,21 +32,18 @@ from mpm.variables import (
 
 
 class Layout(NamedTuple):
-    """Where the levels lie in the lists of elements, nodes and rows: see :class:`mpm.levels.Levels`."""
+    """Where the levels lie in the lists of elements and nodes: see :class:`mpm.levels.Levels`."""
 
     element_cuts: np.ndarray
     node_cuts: np.ndarray
-    row_cuts: np.ndarray
     first_of_node: np.ndarray
-    first_of_row: np.ndarray
 
 
 class Cuts(NamedTuple):
-    """Where the lists of occupied elements, nodes and rows of each level are cut: (n_levels, n_parts + 1) int64."""
+    """Where the lists of occupied elements and nodes of each level are cut: (n_levels, n_parts + 1) int64."""
 
     elements: np.ndarray
     nodes: np.ndarray
-    rows: np.ndarray
     solved: np.ndarray  # `nodes` at the beginning of the long step: the others change while nodes are solved
 
 
@@ -265,7 +262,7 @@ def place_of(value, ascending, low, high):
 
 @integer_kernel
 def cut_by_work(start, occupied, n_occupied, layout, n_levels, cuts):
-    """Cut the occupied elements of the finest levels into parts of about as much work, and nodes and rows with them.
+    """Cut the occupied elements of the finest levels into parts of about as much work, and nodes with them.
 
     So whoever takes the same part of every pass finds most of what it needs where it left it, in its own cache.
 
@@ -273,8 +270,8 @@ def cut_by_work(start, occupied, n_occupied, layout, n_levels, cuts):
     ----------
     layout : Layout
     cuts : Cuts
-        Written, but for `solved`: places in the list of occupied elements, of nodes and of rows. The elements of
-        further levels are shifted with the list.
+        Written, but for `solved`: places in the list of occupied elements and of nodes. The elements of further
+        levels are shifted with the list.
     """
     parts = cuts.elements.shape[1] - 1
     change = n_occupied - cuts.elements[-1, -1]
@@ -288,8 +285,7 @@ def cut_by_work(start, occupied, n_occupied, layout, n_levels, cuts):
         end = place_of(layout.element_cuts[level + 1], occupied, low, n_occupied)
         work = after - begin + ELEMENT_WORK * (end - first)
         node, last_node = layout.node_cuts[level], layout.node_cuts[level + 1]
-        row, last_row = layout.row_cuts[level], layout.row_cuts[level + 1]
-        cuts.elements[level, 0], cuts.nodes[level, 0], cuts.rows[level, 0] = first, node, row
+        cuts.elements[level, 0], cuts.nodes[level, 0] = first, node
         for part in range(1, parts):
             high = end
             while low < high:
@@ -301,9 +297,8 @@ def cut_by_work(start, occupied, n_occupied, layout, n_levels, cuts):
                     high = middle
             element = occupied[low] if low < end else layout.element_cuts[level + 1]
             node = place_of(element, layout.first_of_node, node, last_node)
-            row = place_of(element, layout.first_of_row, row, last_row)
-            cuts.elements[level, part], cuts.nodes[level, part], cuts.rows[level, part] = low, node, row
-        cuts.elements[level, parts], cuts.nodes[level, parts], cuts.rows[level, parts] = end, last_node, last_row
+            cuts.elements[level, part], cuts.nodes[level, part] = low, node
+        cuts.elements[level, parts], cuts.nodes[level, parts] = end, last_node
 
 
 @kernel_part

@@ -137,7 +137,7 @@ class Solver(Measures):
         self.fixed[self.mirror_line] |= MIRROR_X
         self._build_contact()
         self._layout = Layout(*(getattr(self.levels, name) for name in Layout._fields))
-        self._cuts = Cuts(*np.zeros((4, self.levels.count, PARTS + 1), np.int64))
+        self._cuts = Cuts(*np.zeros((3, self.levels.count, PARTS + 1), np.int64))
         self._counts, self._measures = np.zeros(5, np.int64), np.zeros(2)
         self._limits = np.zeros((2 * PARTS, 2))
         self._suspended, self._bad, self._n_left, self._first_left = np.zeros((4, PARTS), np.int64)
