@@ -46,6 +46,7 @@ NUMERICS = (
     ("pressure_filter 0.1", {"numerics": {"pressure_filter": 0.1}}),
     ("pressure_filter 0.8", {"numerics": {"pressure_filter": 0.8}}),
     ("stress_damping 0 (off)", {"numerics": {"stress_damping": 0.0}}),
+    ("stress_damping 0.25", {"numerics": {"stress_damping": 0.25}}),
     ("stress_damping 1", {"numerics": {"stress_damping": 1.0}}),
     ("pic_rate 0 (pure FLIP)", {"numerics": {"pic_rate": 0.0}}),
     ("pic_rate 10 /s", {"numerics": {"pic_rate": 10.0}}),
@@ -176,6 +177,7 @@ def spread(rows):
 def main():
     parts = {"numerics": NUMERICS, "physics": PHYSICS}
     chosen = [parts[name] for name in sys.argv[1:] or parts]
+    attributes = root_attributes(coupling.load_scene("quick"))  # the revision that runs
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         jobs = [[pool.submit(measure, *row) for row in part] for part in chosen]
         rows = []
@@ -186,7 +188,6 @@ def main():
                 print(rows[-1][-1], flush=True)
     if len(rows) < 2:
         return
-    attributes = root_attributes(coupling.load_scene("quick"))
     numerics, physics = rows
     page = [
         "# What moves the inflow, and what must not",

@@ -243,7 +243,7 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, update_points, lo
                 tally.limits[parts + part, 0], tally.limits[parts + part, 1] = locate(
                     tally.left[base:], left, tally.origin[base:], ground.element_of_point, ground.points,
                     ground.soil_of_point, ground.soils, medium.density_liquid, net.rows, net.geometry,
-                    net.neighbours, pace.wave_speed, net.level_of_element, finished,
+                    net.neighbours, net.contents, pace.wave_speed, net.level_of_element, finished,
                     net.touched[part], net.sums[part], tally.clamps[part],
                 )  # fmt: skip
             return lap(tally.used, LOCATE, thread, mark)

@@ -10,6 +10,7 @@ from mpm.jit import LINE, index, integer_kernel, kernel, kernel_part
 from mpm.transfer import map_kernel
 from mpm.variables import (
     C_RETURNED,
+    E_FILL,
     E_PRESSURE,
     E_VOLUME,
     E_X,
@@ -432,8 +433,8 @@ def follow_points(
 
     left, origin : (n_points,) int32
         Those of each part from `first_left` on, `n_left` (n_parts,) int64 of them.
-    contents : (n_elements, 4) float64, of `update_points`
-        Added: these points.
+    contents : (n_elements, 5) float64, of `update_points`
+        Added: these points. Elements that they leave empty are not full.
     Others as of `locate` and `update_order`.
 
     Returns
@@ -470,6 +471,10 @@ def follow_points(
     n_occupied, n_active = update_order(
         element_of_point, moved_point, moved_from, n_moved, start, order, occupied, n_occupied, spare_start, spare_order
     )
+    for k in range(n_moved):
+        e = moved_from[k]
+        if start[e + 1] == start[e]:
+            contents[e, E_FILL] = 0.0
     return n_occupied, n_active, removed
 
 
@@ -481,7 +486,7 @@ def locate_kernel(wet, undrained, tied):
     @kernel_part
     def locate(
         left, n_left, origin, element_of_point, points, soil_of_point, soils, density_liquid, rows, geometry,
-        neighbours, wave_speed, level_of_element, finished, touched, sums, clamps,
+        neighbours, contents, wave_speed, level_of_element, finished, touched, sums, clamps,
     ):  # fmt: skip
         """Find the new element of every point that left its own, walking over neighbours, and map it there.
 
@@ -551,8 +556,11 @@ def locate_kernel(wet, undrained, tied):
             element_of_point[i] = e
             if e >= 0:
                 fastest = np.sqrt(
-                    map_point(points[i], soils[soil_of_point[i]], density_liquid, rows[e], geometry[e], touched, sums)
-                )
+                    map_point(
+                        points[i], soils[soil_of_point[i]], density_liquid, rows[e], geometry[e], contents[e, E_FILL],
+                        touched, sums,
+                    )
+                )  # fmt: skip
                 local = geometry[e, 7] / ((wave_speed + fastest) * (1 << level_of_element[e]))
                 if local < limit:
                     limit = local

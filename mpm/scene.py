@@ -303,8 +303,8 @@ class Numerics(Part):
         second, not per step: the viscosity that it adds falls with the square of the mesh size.
     pressure_filter : float
         Share that is taken in each step of the part of the pore pressure that no node feels: what points of an element
-        differ in beyond the slope of its quadrilateral, and what alternates around the quadrilateral's centre [-].
-        0 is off. Nodes, forces and water balance of an element are the same before and after.
+        differ in beyond the slope of its quadrilateral [-]. 0 is off. Nodes, forces and water balance of an element are
+        the same before and after.
     stress_damping : float
         How far the stress that acts runs ahead of that of the points, in steps of the element [-]; 0 is off. A
         Kelvin-Voigt viscosity whose time vanishes with the mesh, within the strength of the soil: it damps the elastic
@@ -319,7 +319,7 @@ class Numerics(Part):
     courant: float = Field(default=0.8, gt=0, le=1)
     pic_rate: Annotated[float, in_unit("1/s")] = Field(default=1.0, ge=0)
     pressure_filter: float = Field(default=0.4, ge=0, le=1)
-    stress_damping: float = Field(default=0.25, ge=0, le=2)
+    stress_damping: float = Field(default=0.5, ge=0, le=2)
     critical_step: Literal["altitude", "spectral"] = "spectral"
     local_time_stepping: bool = True
     relaxation_tolerance: float = Field(default=1e-5, gt=0, lt=1)

@@ -53,7 +53,7 @@ from mpm.spectrum import Spectrum, spectral_time_step
 from mpm.tables import element_geometry, element_neighbours, outflow_nodes, soil_table
 from mpm.threads import Threads, check_threads
 from mpm.time_step import dry_wave_speed, fast_wave_speed
-from mpm.transfer import advance_kernel, update_kernel
+from mpm.transfer import advance_kernel, fill_cells, update_kernel
 from mpm.variables import (
     BUFFER_WIDTH,
     CLAMPS,
@@ -306,6 +306,7 @@ class Solver(Measures):
         weights = {E_VOLUME: 1.0, E_PRESSURE: np.maximum(points[:, P], 0.0), E_X: points[:, X], E_Y: points[:, Y]}
         for column, weight in weights.items():
             self.contents[:, column] = np.bincount(element, volume * weight, len(self.contents))
+        fill_cells(self.geometry, self.contents)
         self.sums[:] = 0.0
         self.clock.map_only()
         self._run(UPDATE, FOLLOW, advance=False)

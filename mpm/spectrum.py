@@ -27,7 +27,8 @@ from mpm.contact import FIXED_X, FIXED_Y, free_pair
 from mpm.jit import index, kernel, kernel_part
 from mpm.long_step import Ground, Medium
 from mpm.meeting import next_part, next_stage, take_part
-from mpm.variables import MASS, S_DRAG, S_G, S_LAMBDA, S_RHO_S, N, X, Y
+from mpm.transfer import felt_share
+from mpm.variables import E_FILL, MASS, S_DRAG, S_G, S_LAMBDA, S_RHO_S, N, X, Y
 
 SAFETY = 0.9  # Ritz values come from below, and points move until the next estimate
 TOLERANCE = 1e-2  # of the largest eigenvalue
@@ -50,6 +51,7 @@ class Operator(NamedTuple):
 
     elements: np.ndarray
     geometry: np.ndarray
+    contents: np.ndarray
     stiffened: np.ndarray
     fixed: np.ndarray
     step_of_node: np.ndarray
@@ -66,10 +68,12 @@ class Operator(NamedTuple):
 
 @kernel_part
 def sum_points(
-    first, last, ground, medium, elements, geometry, stiffened, undrained, held, nodal
+    first, last, ground, medium, elements, geometry, contents, stiffened, undrained, held, nodal
 ):  # fmt: skip
     """Sum the points of a range of elements in these and at the nodes.
 
+    contents : (n_elements, 5) float64
+        How full the elements are (`mpm.transfer.fill_of_cell`).
     stiffened : (n_elements,) float64
         Factor of the stiffness of an element.
     undrained : bool
@@ -85,6 +89,7 @@ def sum_points(
         for column in range(ELEMENT_WIDTH):
             held[k, column] = 0.0
         g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
+        total = 0.0
         for j in range(ground.start[e], ground.start[e + 1]):
             i = index(ground.order[j])
             s = index(ground.soil_of_point[i])
@@ -95,6 +100,7 @@ def sum_points(
             volume = mass / (soils[s, S_RHO_S] * (1.0 - n))
             water = volume * medium.density_liquid
             stiff = volume * stiffened[e]
+            total += volume
             if undrained:
                 mass += n * water
             held[k, E_LAMBDA] += stiff * soils[s, S_LAMBDA]
@@ -112,6 +118,9 @@ def sum_points(
                 nodal[c, 1] += weight[a] * water
                 nodal[c, 2] += weight[a] * n * water
                 nodal[c, 3] += weight[a] * n * water * soils[s, S_DRAG]
+        share = felt_share(total, geometry[e, 6], contents[e, E_FILL])
+        for column in range(E_GRAINS):
+            held[k, column] *= share
 
 
 @kernel_part
@@ -120,8 +129,8 @@ def gather_part(which, part, ground, medium, o):
     parts = o.at_nodes.shape[0]
     if which == 0:
         sum_points(
-            o.element_cuts[part], o.element_cuts[part + 1], ground, medium, o.elements, o.geometry, o.stiffened,
-            o.undrained, o.held, o.at_nodes[part],
+            o.element_cuts[part], o.element_cuts[part + 1], ground, medium, o.elements, o.geometry, o.contents,
+            o.stiffened, o.undrained, o.held, o.at_nodes[part],
         )  # fmt: skip
     elif which == 1:
         for i in range(o.node_cuts[part], o.node_cuts[part + 1]):
@@ -345,6 +354,7 @@ class Spectrum:
         self.operator = Operator(
             elements=mesh.elements,
             geometry=solver.geometry,
+            contents=solver.contents,
             stiffened=levels.stiffened(solver.scene.numerics.stress_damping),
             fixed=solver.fixed,
             step_of_node=2.0 ** levels.of_row[:n_nodes],
@@ -364,7 +374,7 @@ class Spectrum:
     @property
     def arrays(self):
         """All arrays that were made for it."""
-        shared = {"elements", "geometry", "stiffened", "fixed"}
+        shared = {"elements", "geometry", "contents", "stiffened", "fixed"}
         own = [value for name, value in self.operator._asdict().items() if name not in shared]
         return [self.basis, *(value for value in own if isinstance(value, np.ndarray))]
 

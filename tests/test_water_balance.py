@@ -8,7 +8,7 @@ import coupling
 import mpm
 from mpm.scene import Scene
 from mpm.solver import Solver
-from mpm.variables import B_FLX, B_FLY, SXX, SXY, SYY, SZZ, N, P, X, Y
+from mpm.variables import B_FLX, B_FLY, B_FX, B_FY, SXX, SXY, SYY, SZZ, N, P, X, Y
 
 
 def full_box(**numerics):
@@ -76,6 +76,31 @@ def test_filter_moves_no_node():
     solver.step(1e-12)
     assert np.abs(rows[:, P] - before).max() > 1e3
     assert np.abs(solver.nodal_sums()[:, [B_FLX, B_FLY]] - force).max() < 1e-8 * np.abs(force).max()
+
+
+def test_even_stress_pushes_no_inner_node_however_points_are_shared_among_triangles():
+    """Equilibrium is a matter of the stress alone: of three points that cross an edge none takes force along."""
+    solver = full_box(stress_damping=0.0)
+    rows = solver.points
+    rows[:, SXX], rows[:, SYY], rows[:, SXY] = -1e5, -2e5, 3e4
+    corner = solver.mesh.nodes[solver.mesh.elements[solver.element_of_point]]
+    rng = np.random.default_rng(2)
+    weight = rng.dirichlet((1.0, 1.0, 1.0), solver.n_points)
+    rows[:, X : Y + 1] = np.einsum("pk,pkd->pd", weight, corner)
+    given = (solver.element_of_point % 4 == 0) & (
+        np.arange(solver.n_points) % 3 == 0
+    )  # one of three goes to the next triangle of its cell
+    assert given.any()
+    solver.element_of_point[given] += 1
+    rows[given, X : Y + 1] = solver.mesh.nodes[solver.mesh.elements[solver.element_of_point[given]]].mean(axis=1)
+    solver._sort()
+    solver.map_points()
+    force = solver.nodal_sums()
+    nodes = solver.mesh.nodes
+    inner = (np.abs(nodes[:, 0]) < 0.99) & (nodes[:, 1] < -0.01) & (nodes[:, 1] > -0.99)
+    for column in ([B_FX, B_FY], [B_FLX, B_FLY]):
+        size = np.abs(force[~inner][:, column]).max()
+        assert size > 1e3 and np.abs(force[inner][:, column]).max() < 1e-9 * size
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ FAMILIES = ("columns", "waves", "motion", "conservation", "plasticity", "flows",
 #: Numerical choices that a problem hands through to its scene, and the values that its ladder goes through.
 NUMERICS = {
     "points": (1, 3, 12), "courant": (0.4, 0.8, 1.0), "pic_rate": (0.0, 1.0, 10.0, 100.0),
-    "stress_damping": (0.0, 0.25, 1.0),
+    "stress_damping": (0.0, 0.5, 1.0),
 }  # fmt: skip
 #: The same of pore water.
 WET = {"pressure_filter": (0.0, 0.1, 0.4, 0.8)}
