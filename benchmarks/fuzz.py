@@ -20,7 +20,21 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "benchmarks")]
 COUNTS = {"scenes": 10_000, "files": 1_000}
 PYTHON_EVERY = 4  # every so many scenes also as Python dictionaries
-SIMULATED = 12
+SIMULATED = 4  # of every base
+SHORT = {"stop": {"time": 0.01}, "output": {"interval": 0.005}}
+TUNNEL = {"cover": 20.0, "outer_diameter": 6.6, "inner_diameter": 5.9, "friction_coefficient": 0.2,
+          "lining_density": 2548.0}  # fmt: skip
+TWO = {"box.width": 80.0, "tunnels": [{"x": -7.0, **TUNNEL}, {"x": 7.0, **TUNNEL}]}
+#: What the generated scenes are made from: changes of the small event.
+BASES = {
+    "one tunnel": {},
+    "without a gate": {"gate": "none"},
+    "lowered water": {"water.table_depth": 3.5},
+    "two tunnels": TWO,
+    "two tunnels without a gate, lowered water": {
+        **TWO, "gate": "none", "water.table_depth": 3.5,
+    },
+}  # fmt: skip
 #: Damages by kind of file; a run file takes a second, a scene a millisecond.
 SHARES = {"run.nc": 0.15, "checkpoint.h5": 0.3, "run.nc.journal": 0.15, "scene.toml": 0.25, "study.toml": 0.15}
 STUDY = """name = "angles"
@@ -60,10 +74,12 @@ def scenes(place, count, seed):
 
     import coupling
 
-    base, file = small_scene(stop={"time": 0.01}, output={"interval": 0.005}).source, place / "mine.toml"
-    verdicts, faults, slowest, planned = Counter(), [], 0.0, []
+    file, bases = place / "mine.toml", {name: small_scene(**SHORT, **changes).source for name, changes in BASES.items()}
+    verdicts, dotted, faults, slowest, planned = Counter(), Counter(), [], 0.0, []
     for number in range(count):
-        text = wild_scenes.wild_text(random.Random(f"{seed} {number}"), base)
+        chance = random.Random(f"{seed} {number}")
+        kind = chance.choice(list(bases))
+        text = wild_scenes.wild_text(chance, bases[kind])
         file.write_bytes(text.encode("utf-8", "surrogatepass"))
         begin = time.monotonic()
         try:
@@ -72,23 +88,46 @@ def scenes(place, count, seed):
                 with contextlib.suppress(ValueError, RecursionError):
                     data = tomllib.loads(text)
                     wild_scenes.judged(lambda data=data: coupling.make_scene(data, "dictionary"), "dictionary", False)
+            if number % PYTHON_EVERY == 1:
+                dotted[changed_by_names(chance, place, kind, bases[kind])] += 1
         except Exception:
             verdict, said = "fault", traceback.format_exc()
             faults.append(f"scene {number}: {said[-300:]}")
         slowest = max(slowest, time.monotonic() - begin)
         verdicts[verdict if verdict != "warned" else "planned with a warning"] += 1
         if verdict in ("planned", "warned"):
-            planned.append(text)
+            planned.append((kind, text))
     # compiles what the children, which share this process's memory, then find ready
     coupling.run(small_scene(stop={"time": 0.01}), place / "compiled", threads=1)
-    simulated = random.Random(seed).sample(planned, min(SIMULATED, len(planned)))
+    simulated = [
+        text
+        for kind in bases
+        for text in random.Random(seed).sample(texts := [t for k, t in planned if k == kind], min(SIMULATED, len(texts)))
+    ]
     for number, text in enumerate(simulated):
         fault = simulation_fault(place, text, number)
         faults += [fault] if fault else []
     return {
         "verdicts": dict(verdicts.most_common()), "faults": faults, "slowest_seconds": slowest,
+        "bases": list(bases), "dotted": dict(dotted.most_common()),
         "python_every": PYTHON_EVERY, "simulated": len(simulated), "patience": wild_scenes.PATIENCE,
     }  # fmt: skip
+
+
+def changed_by_names(chance, place, kind, text):
+    """Verdict on a good scene that is changed by dotted names, right and wrong ones."""
+    import wild_scenes
+
+    import coupling
+
+    file = place / f"{kind.replace(' ', '-')}.toml"
+    file.write_text(text, encoding="utf-8")
+    changes, (name, expected) = wild_scenes.wild_changes(chance)
+    verdict, _ = wild_scenes.judged(lambda: coupling.load_scene(file, **changes), "scene", False)
+    if verdict != "refused":
+        found = wild_scenes.value_at(coupling.load_scene(file, **changes), name)
+        assert abs(found - expected) <= 1e-12 * expected, f"{changes}: {name} is {found}"
+    return verdict
 
 
 def simulation_fault(place, text, number):

@@ -561,7 +561,8 @@ def _with_entries(name: str, entries: list[Any] | tuple[Any, ...], changes: dict
     """A list in which the entries of some numbers, the keys of `changes`, are changed."""
     result = list(entries)
     for key, value in changes.items():
-        number = int(key) if str(key).isdecimal() else len(result)
+        # Python refuses to read a number of thousands of digits
+        number = int(key) if str(key).isdecimal() and len(str(key)) < 10 else len(result)
         if number >= len(result):
             raise SceneError(
                 f"{name}.{shortened(str(key))[1:-1]}: must be a number below {len(result)}, the length of that list; "

@@ -54,7 +54,7 @@ def check_pressures(pressures: xr.Dataset, ring: Ring | None = None) -> xr.Datas
     found = pressures[kept].assign_coords(time=_time(pressures["time"]), theta=_angles(pressures["theta"]))
     for name in PRESSURES:
         variable = found[name]
-        values = _in_unit(variable.values, variable.attrs.get("units", "Pa"), "Pa", name)
+        values = _in_unit(variable.values, str(variable.attrs.get("units", "Pa")), "Pa", name)
         bad = int((~np.isfinite(values)).sum())
         if bad:
             raise ValueError(f"pressures: {name} must be finite, got {bad} values that are not; drop those times")
@@ -132,7 +132,13 @@ def _angles(theta):
     if values is not theta.values:  # of 2 pi rad, say, a last digit may be left
         values = np.round(values, 10)
     about = {"units": "degree", "long_name": "angle from the crown, clockwise"}
-    return "theta", values % 360, {**theta.attrs, **about}
+    if len(values) and np.ptp(values) > 360 + 1e-6:
+        raise ValueError(
+            f"pressures: theta must lie within one turn, got {values.min():g} to {values.max():g} degrees; give theta "
+            "its units where it is in gon or rad, or take theta % 360"
+        )
+    # % alone makes 360 of -1e-20
+    return "theta", values % 360 % 360, {**theta.attrs, **about}
 
 
 def _around_the_ring(found):
@@ -204,6 +210,11 @@ def _registry():
 SPELLINGS = {"": "1", "sec": "s", "degrees_clockwise": "degree", "°": "degree"}
 
 
+#: Names with a one-digit exponent at most, joined by * or /: pint would compute "9**9**9 Pa" for ever.
+_UNIT = r"[^\W\d]+(?:(?:\*\*|\^)-?[0-9])?"
+UNITS = re.compile(rf"1|(?:1 */ *)?\(?{_UNIT}(?: *[*/.] *\(?{_UNIT}\)?){{0,8}}")
+
+
 def _in_unit(values, units, wanted, name):
     """Values as float64 in another unit."""
     try:
@@ -216,7 +227,7 @@ def _in_unit(values, units, wanted, name):
     text = re.sub(r"([a-zA-Z])(-?[0-9])", r"\1**\2", SPELLINGS.get(units.strip(), units.strip()))
     text = re.sub(r"(?<=[\w)])\s+(?=[a-zA-Z])", "*", text)
     try:
-        if not re.fullmatch(r"[\w*/^ .()°-]{1,40}", text):
+        if not UNITS.fullmatch(text):
             raise ValueError("no unit")
         factor = _registry().Quantity(1.0, text).to(wanted).magnitude
     except Exception:

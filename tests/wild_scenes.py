@@ -66,6 +66,42 @@ def wild_text(random, base):
     return text
 
 
+#: Dotted names with right values, as given and as they have to be read.
+RIGHT = (
+    ("soils.0.friction_angle", 33, 33.0), ("soils.0.friction_angle", "0.5 rad", 28.64788975654116),
+    ("soils.0.youngs_modulus", "30 MPa", 3e7), ("soils.0.cohesion", "2 kPa", 2e3), ("soils.0.porosity", "44 %", 0.44),
+    ("soils.0.hydraulic_conductivity", "8.64 m/day", 1e-4), ("stop.time", "20 ms", 0.02),
+    ("discretisation.element_size", "600 cm", 6.0), ("gravity", "981 cm/s^2", 9.81), ("water.density", 1010, 1010.0),
+)  # fmt: skip
+#: Dotted names, most of which name nothing.
+DOTTED = (
+    "soils.1.k0", "soils.-1.k0", "soils.0.phi", "soils..k0", "soils.0", "soils.0.k0.x", "soils", "soils.x.k0", "", ".",
+    "gate.angle", "gate.widht", "gate", "water.table_depth", "water", "tunnels.1.x", "tunnels.7.x", "tunnels.0.cover",
+    "ring.ground.cohesion", "ring.concrete_modulus", "ring.ground", "ring.joint_angles.0", "numerics.courant_number",
+    "name", "name.x", "base", "base.x", "output.interval", "soils." + 5000 * "9" + ".k0", "a" + 3000 * ".a",
+    "soils.\u0663.k0", "soils.0.name", "__class__.__init__", "box.width", "stop.inflow_mass",
+)  # fmt: skip
+VALUES = (
+    0, -1, 33, 0.5, 1e308, 10**400, float("nan"), True, None, "none", "33", "33 deg", "20 cm", "0,2 m", "20 kg", "", "x",
+    "1 m" * 50, "9**9**9 m", [], [1.0], [None], {}, {"a": 1}, {"0": 1}, {1: 2}, b"x", {1.0}, object(), (1, 2), 1j, print,
+)  # fmt: skip
+
+
+def wild_changes(random):
+    """Changes by dotted names, and what the right one of them has to give: (changes, (name, value))."""
+    name, given, expected = random.choice(RIGHT)
+    wild = {random.choice(DOTTED): random.choice(VALUES) for _ in range(random.choice((0, 0, 1, 1, 2)))}
+    return {**wild, name: given}, (name, expected)
+
+
+def value_at(scene, name):
+    """Value of a scene under a dotted name."""
+    value = scene.mpm
+    for part in name.split("."):
+        value = value[int(part)] if part.isdecimal() else getattr(value, part)
+    return value
+
+
 def _change(random, lines):
     at = random.randrange(len(lines))
     key = re.match(r"([\w]+) = (.*)", lines[at])
