@@ -1,8 +1,8 @@
 """Generated scenes and damaged files: each must give a plan, the right content, or a refusal that says what to do.
 
-    uv run python benchmarks/fuzz.py [scenes | files] [--count N] [--seed 0]
+    uv run python benchmarks/fuzz.py [scenes | files | pressures | rings] [--count N] [--seed 0]
 
-10 000 scenes and 1 000 files when left out. Writes its parts of docs/robustness.md and docs/robustness.json.
+10 000 scenes, 1 000 files, 2 000 imported pressures and 200 rings when left out. Writes its parts of docs/robustness.md and docs/robustness.json.
 """
 
 import argparse
@@ -18,7 +18,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "benchmarks")]
-COUNTS = {"scenes": 10_000, "files": 1_000}
+COUNTS = {"scenes": 10_000, "files": 1_000, "pressures": 2_000, "rings": 200}
 PYTHON_EVERY = 4  # every so many scenes also as Python dictionaries
 SIMULATED = 4  # of every base
 SHORT = {"stop": {"time": 0.01}, "output": {"interval": 0.005}}
@@ -59,7 +59,7 @@ def main():
         count = options.count or COUNTS[what]
         with tempfile.TemporaryDirectory(prefix="gush-fuzz-") as place:
             begin = time.monotonic()
-            result = {"scenes": scenes, "files": files}[what](Path(place), count, options.seed)
+            result = JUDGES[what](Path(place), count, options.seed)
         result |= {"count": count, "seed": options.seed, "seconds": time.monotonic() - begin}
         write_part(what, result)
         print(what, result["verdicts"], *result["faults"], sep="\n  ")
@@ -98,12 +98,12 @@ def scenes(place, count, seed):
         if verdict in ("planned", "warned"):
             planned.append((kind, text))
     # compiles what the children, which share this process's memory, then find ready
-    coupling.run(small_scene(stop={"time": 0.01}), place / "compiled", threads=1)
-    simulated = [
-        text
-        for kind in bases
-        for text in random.Random(seed).sample(texts := [t for k, t in planned if k == kind], min(SIMULATED, len(texts)))
-    ]
+    for kind, changes in BASES.items():
+        coupling.run(small_scene(**SHORT, **changes), place / "compiled" / kind.replace(" ", "-"), threads=1)
+    simulated = []
+    for kind in bases:
+        texts = [text for of, text in planned if of == kind]
+        simulated += random.Random(seed).sample(texts, min(SIMULATED, len(texts)))
     for number, text in enumerate(simulated):
         fault = simulation_fault(place, text, number)
         faults += [fault] if fault else []
@@ -209,6 +209,67 @@ def good_files(place):
         "run.nc": run, "checkpoint.h5": stored, "run.nc.journal": change, "scene.toml": place / "scene.toml",
         "study.toml": place / "study.toml",
     }  # fmt: skip
+
+
+def pressures(place, count, seed):
+    """Judge files of imported pressures with mistakes of which the generator knows what was meant."""
+    import wild_pressures
+
+    import coupling
+
+    ring, file = coupling.load_scene("case-3").ring.model_dump_json(), place / "mine.nc"
+    verdicts, faults = {}, []
+    for number in range(count):
+        given, true, kind = wild_pressures.wild_pressures(random.Random(f"{seed} {number}"))
+        given.assign_attrs(ring=ring).to_netcdf(file, engine="h5netcdf")
+        try:
+            verdict = wild_pressures.judged(file, true, kind)
+        except Exception:
+            verdict = "fault"
+            faults.append(f"{kind} {number}: {traceback.format_exc()[-300:]}")
+        verdicts.setdefault(kind, Counter())[verdict] += 1
+    return {"verdicts": {kind: dict(verdicts[kind]) for kind in sorted(verdicts)}, "faults": faults,
+            "patience": wild_pressures.PATIENCE}  # fmt: skip
+
+
+def rings(place, count, seed):
+    """Random rings under random balanced loads by both models: solved by both, or refused by both with a reason."""
+    import re
+
+    import numpy as np
+    from test_random_rings import SPRINGS, WAYS, outcome, random_balanced_loads, random_ring
+
+    from structure import BeamSpringLining, ContinuumLining
+
+    rng, kinds = np.random.default_rng(seed), list(SPRINGS.values())
+    verdicts, reasons, faults, differences = Counter(), Counter(), [], []
+    for number in range(count):
+        ring, loads = random_ring(rng, kinds[number % len(kinds)]), random_balanced_loads(rng)
+        try:
+            answers = [outcome(model, ring, loads) for model in (BeamSpringLining, ContinuumLining)]
+        except Exception:
+            faults.append(f"ring {number}: {traceback.format_exc()[-300:]}")
+            continue
+        refused = [isinstance(answer, str) for answer in answers]
+        verdicts[{0: "solved by both", 1: "refused by one", 2: "refused by both"}[sum(refused)]] += 1
+        if sum(refused) == 1:
+            faults.append(f"ring {number}: only one model refused: {answers[refused.index(True)]}")
+        elif all(refused):
+            for answer in answers:
+                way = re.search(r"degrees\) (turns|slides|opens or closes) most freely", answer)
+                reasons[f"a joint without stiffness {way[1]}" if way else "other"] += 1
+                if way is None or getattr(ring, WAYS[way[1]]) != 0:
+                    faults.append(f"ring {number}: reason that does not hold: {answer}")
+        else:
+            thrusts = [answer["axial_force"].mean().item() for answer in answers]
+            differences.append(abs(thrusts[1] / thrusts[0] - 1))
+            if not all(answer["equilibrium_residual"] < 1e-8 for answer in answers):
+                faults.append(f"ring {number}: not in equilibrium")
+    return {"verdicts": dict(verdicts.most_common()), "reasons": dict(reasons.most_common()), "faults": faults,
+            "largest_difference": max(differences, default=0.0)}  # fmt: skip
+
+
+JUDGES = {"scenes": scenes, "files": files, "pressures": pressures, "rings": rings}
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ def page(parts):
         "",
         "Written by the commands named below from their own measurements; the numbers are in robustness.json.",
     ]
-    for name, write in (("scenes", _scenes), ("files", _files), ("kills", _kills), ("lost_worker", _lost_worker)):
+    for name, write in WRITERS.items():
         if name in parts:
             lines += ["", *write(parts[name])]
     return "\n".join(lines) + "\n"
@@ -94,6 +94,53 @@ def _files(part):
     ]
 
 
+def _pressures(part):
+    kinds = sorted({kind for counts in part["verdicts"].values() for kind in counts})
+    rows = [
+        f"| {name} | " + " | ".join(str(counts.get(kind, 0)) for kind in kinds) + " |"
+        for name, counts in part["verdicts"].items()
+    ]
+    return [
+        "## Imported pressures",
+        "",
+        f"`uv run python benchmarks/fuzz.py pressures --count {part['count']} --seed {part['seed']}`. netCDF files of "
+        "random pressures in random units, orders and precisions, each with one mistake or none. The generator knows "
+        "what was meant: a file must give that, be warned of, or be refused with rule, value and remedy.",
+        "",
+        "| mistake | " + " | ".join(kinds) + " |",
+        "|---|" + "---|" * len(kinds),
+        *rows,
+        "",
+        f"Faults (a traceback, more than {part['patience']:g} s, a message without its parts, other values than meant "
+        f"without a word): {len(part['faults'])}. Together {part['seconds']:.0f} s.",
+        *_faults(part["faults"]),
+        *_where(part),
+    ]
+
+
+def _rings(part):
+    return [
+        "## Random rings",
+        "",
+        f"`uv run python benchmarks/fuzz.py rings --count {part['count']} --seed {part['seed']}`. Rings of 3 to 12 "
+        "joints anywhere, some without a stiffness, in all kinds of soil springs and in none, under random loads in "
+        "balance, by beams on springs and by the continuum.",
+        "",
+        "| verdict | rings |",
+        "|---|---|",
+        *(f"| {name} | {count} |" for name, count in part["verdicts"].items()),
+        "",
+        "Reasons, of both models: "
+        + (", ".join(f"{count} {name}" for name, count in part["reasons"].items()) or "none")
+        + f". Largest difference of the mean thrust where both solved: {100 * part['largest_difference']:.2g} %.",
+        "",
+        "Faults (a traceback, one model alone refuses, a reason that does not hold, residual above 1e-8 of the loads): "
+        f"{len(part['faults'])}. Together {part['seconds']:.0f} s.",
+        *_faults(part["faults"]),
+        *_where(part),
+    ]
+
+
 def _kills(part):
     rows = [f"| {name} | {count} |" for name, count in sorted(part["found"].items(), key=lambda pair: -pair[1])]
     return [
@@ -129,6 +176,12 @@ def _lost_worker(part):
         f"{part['parallel_seconds']:.0f} s with the workers, {part['serial_seconds']:.0f} s in one process.",
         *_where(part),
     ]
+
+
+WRITERS = {
+    "scenes": _scenes, "files": _files, "pressures": _pressures, "rings": _rings, "kills": _kills,
+    "lost_worker": _lost_worker,
+}  # fmt: skip
 
 
 def _faults(faults):

@@ -655,8 +655,8 @@ def read_group(path: str | Path, group: str | None, row: int | None = None) -> x
 
 def _read(file, group, row=None):
     def complete(time):
-        # a batch cut short by a kill has no time yet: it was written last
-        rows = np.flatnonzero(np.isfinite(time))
+        # a batch cut short by a kill has no time yet: it was written last; no run has records in its root
+        rows = np.arange(len(time)) if group is None else np.flatnonzero(np.isfinite(time))
         if row is None:
             return rows
         if not len(rows):

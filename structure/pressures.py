@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from structure.inputs import GushingWarning
+from structure.inputs import GushingWarning, shortened
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,6 +22,8 @@ FEWEST_ANGLES = 8
 WIDEST_GAP = 60.0
 #: A ring is pulled all around where the mean is below this share of the largest size, which a few cells do not change.
 PULLED = 0.25
+#: A part is not judged below this share of all, and taken for rounding below that one.
+SMALL, NOTHING = 1e-2, 1e-8
 #: Largest pressures outside of this are no tunnel's: less than 0.1 m of water, more than 2 km of rock [Pa].
 USUAL_PRESSURE = (1e3, 5e7)
 
@@ -176,27 +178,60 @@ def _around_the_ring(found):
 
 def _warn_of_size(found, ring):
     """Say where pressures are those of no tunnel: the wrong sign or unit."""
-    total = (found["soil_pressure"] + found["water_pressure"]).transpose("time", "theta").values
-    mean, largest = total.mean(axis=1), float(np.abs(total).max())
+    parts = [found[name].transpose("time", "theta").values for name in PRESSURES]
+    total = parts[0] + parts[1]
+    largest, shear = float(np.abs(total).max()), float(np.abs(parts[2]).max())
     least, most = USUAL_PRESSURE
     what = "0.1 m of water"
     if ring is not None:
         least, what = ring.concrete_unit_weight * ring.thickness, "the weight of the ring"
-    if mean.min() < -PULLED * largest:
-        told = (
-            f"soil and water pull the ring outward all around, {mean.min() / 1e3:.3g} kPa in the mean at "
-            f"{found['time'].values[mean.argmin()]:g} s; inward is positive, change the sign if yours is not"
-        )
+    told = _pulling(found, {"soil and water": total, "soil alone": parts[0], "water alone": parts[1]})
+    small = [name for name, each in zip(PRESSURES[:2], parts, strict=False)
+             if NOTHING * largest < np.abs(each).max() < USUAL_PRESSURE[0]]  # fmt: skip
+    if told:
+        pass
     elif 0 < largest < least:
         told = (
             f"soil and water are {largest:.3g} Pa at most, less than {what} ({least:.3g} Pa); numbers without units "
             "are taken as Pa, give e.g. units = 'kPa'"
         )
-    elif largest > most:
-        told = f"soil and water are up to {largest:.3g} Pa, beyond any tunnel's ({most:.1g} Pa); check their units"
-    else:
-        return
-    warnings.warn(f"pressures: {told}", GushingWarning, stacklevel=3)
+    elif max(largest, shear) > most:
+        told = f"they are up to {max(largest, shear):.3g} Pa, beyond any tunnel's ({most:.1g} Pa); check their units"
+    elif small:
+        told = (
+            f"{' and '.join(small)} never reach {USUAL_PRESSURE[0]:g} Pa where all together are {largest:.3g} Pa; "
+            "numbers without units are taken as Pa, give e.g. units = 'kPa'"
+        )
+    told = told or _odd_step(found["theta"].values)
+    if told:
+        warnings.warn(f"pressures: {told}", GushingWarning, stacklevel=3)
+
+
+def _pulling(found, parts):
+    """What is said of the first of the parts {name: (time, theta)} that pulls all around, "" where none does."""
+    whole = max(float(np.abs(values).max()) for values in parts.values())
+    for name, values in parts.items():
+        mean, largest = values.mean(axis=1), float(np.abs(values).max())
+        if largest > SMALL * whole and mean.min() < -PULLED * largest:
+            return (
+                f"{name} pull the ring outward all around, {mean.min() / 1e3:.3g} kPa in the mean at "
+                f"{found['time'].values[mean.argmin()]:g} s; inward is positive, change the sign if yours is not"
+            )
+    return ""
+
+
+def _odd_step(theta):
+    """What is said of one step between angles [degree] unlike all others: angles in another unit than they seem."""
+    gaps = np.diff(np.append(theta, theta[0] + 360))
+    odd = int(np.argmax(np.abs(gaps - np.median(gaps))))
+    others = np.delete(gaps, odd)
+    uneven = others.max() > 2.5 * others.min()
+    if uneven or (2 * gaps[odd] >= others.min() and gaps[odd] <= 2 * others.max() + 1e-6):
+        return ""
+    return (
+        f"theta has steps of {others.min():.4g} to {others.max():.4g} degrees, but one of {gaps[odd]:.4g} after "
+        f"{theta[odd]:g}; pressures are linear there, check the units of theta or add what is missing"
+    )
 
 
 @cache
@@ -232,6 +267,6 @@ def _in_unit(values, units, wanted, name):
         factor = _registry().Quantity(1.0, text).to(wanted).magnitude
     except Exception:
         raise ValueError(
-            f"pressures: {name} must be in {wanted}, got {units!r}; convert it, or correct its units"
+            f"pressures: {name} must be in {wanted}, got {shortened(units)}; convert it, or correct its units"
         ) from None
     return numbers * factor

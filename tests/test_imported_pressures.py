@@ -9,6 +9,8 @@ from test_cli import gush
 
 import coupling
 import structure
+from coupling.datasets import RunFileError
+from coupling.pressure_source import read_source
 from structure.pressures import WIDEST_GAP, check_pressures
 
 RING = coupling.load_scene("case-3").ring
@@ -154,3 +156,44 @@ def test_ring_in_tension_or_under_less_than_its_own_weight_is_warned_of(tmp_path
 def test_eight_cells_at_equal_spacing_are_enough():
     assert 360 / 8 < WIDEST_GAP
     assert check_pressures(loads(np.arange(0.0, 360.0, 45.0))).sizes["theta"] == 8
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (lambda: with_theta(loads(), loads()["theta"].values * 10 / 9), "within one turn, got 0 to 394.444 degrees"),
+        (lambda: with_theta(loads(), loads()["theta"].values, "9**9**9"), "theta must be in degree, got '9"),
+        (
+            lambda: loads().assign(soil_pressure=loads()["soil_pressure"].assign_attrs(units=5)),
+            "soil_pressure must be in Pa, got '5'",
+        ),
+    ],
+)
+def test_what_generated_files_found_is_refused(data, message):
+    with pytest.raises(ValueError, match=message):
+        check_pressures(data())
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (lambda: with_theta(loads(), loads()["theta"].values, "gon"), "but one of 40.5 after 319.5"),
+        (lambda: loads().assign(soil_pressure=-loads()["soil_pressure"]), "soil alone pull the ring outward"),
+        (lambda: loads().assign(soil_pressure=loads()["soil_pressure"] / 1e3), "soil_pressure never reach 1000 Pa"),
+    ],
+)
+def test_what_generated_files_found_is_warned_of(data, message):
+    with pytest.warns(structure.GushingWarning, match=message):
+        check_pressures(data(), RING)
+
+
+def test_angle_just_below_zero_is_zero():
+    data = loads()
+    assert check_pressures(with_theta(data, np.r_[-1e-20, data["theta"].values[1:]]))["theta"][0] == 0
+
+
+def test_record_without_a_time_in_a_file_is_refused(tmp_path):
+    data = loads().assign_coords(time=[0.0, np.nan]).assign_attrs(ring=RING.model_dump_json())
+    data.to_netcdf(tmp_path / "mine.nc", engine="h5netcdf")
+    with pytest.raises(RunFileError, match="time must be finite, got 1 values"):
+        read_source(tmp_path / "mine.nc")

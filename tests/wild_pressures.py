@@ -47,7 +47,7 @@ def wild_pressures(random):
     given = _mistaken(random, draw, kind, true)
     if random.random() < 0.5:
         given = given.isel(theta=draw.permutation(given.sizes["theta"]))
-    if random.random() < 0.3:
+    if random.random() < 0.3 and kind != "more than a turn":
         given = given.assign_coords(theta=(given["theta"] + 180) % 360 - 180)
     return _in_units(random, kind, given), true, kind
 
@@ -111,7 +111,8 @@ def _in_units(random, kind, given):
 
     def stated(what, units):
         unit = random.choice(list(units))
-        others = [each for each in units if units[each] != units[unit]]
+        # bar for MPa could be meant
+        others = [each for each in units if units[each] != units[unit] and "bar" not in (each, unit)] or [unit]
         factor = units[random.choice(others)] if kind == f"{what} in other units" else units[unit]
         if kind == f"{what} in no units":
             unit = random.choice(NO_UNITS)
@@ -128,10 +129,7 @@ def _in_units(random, kind, given):
         own = {**about}
         size = factor
         if kind == "one pressure in other units" and name == alone:
-            size = random.choice([other for other in STRESSES.values() if other != factor])
-            own = random.choice(({}, own))
-            if not own and size == 1:
-                size = 1e-3
+            size, own = random.choice(((1e-3, {}), (1e-6, {}), (1e3, {"units": "MPa"}), (1.0, {"units": "kPa"})))
         given[name] = (given[name] * size).assign_attrs(own)
         if kind == "packed":
             given[name].encoding = {"dtype": "i4", "scale_factor": 0.01 * size, "_FillValue": -(2**31)}
