@@ -2,7 +2,8 @@
 
     uv run python benchmarks/fuzz.py [scenes | files | pressures | rings] [--count N] [--seed 0]
 
-10 000 scenes, 1 000 files, 2 000 imported pressures and 200 rings when left out. Writes its parts of docs/robustness.md and docs/robustness.json.
+10 000 scenes, 1 000 files, 2 000 imported pressures and 200 rings when left out. Writes its
+parts of docs/robustness.md and docs/robustness.json.
 """
 
 import argparse

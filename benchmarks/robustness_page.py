@@ -44,14 +44,15 @@ def _scenes(part):
         "## Generated scenes",
         "",
         f"`uv run python benchmarks/fuzz.py scenes --count {part['count']} --seed {part['seed']}`. Each scene is the "
-        f"text of a good one ({', '.join(part['bases'])}) with up to six changes: numbers scaled, nudged or replaced by what is no number, keys "
+        f"text of a good one ({', '.join(part['bases'])}) with up to six changes: "
+        "numbers scaled, nudged or replaced by what is no number, keys "
         "misspelt, dropped and doubled, names that lead out of the folder, bases that are devices or addresses, torn "
         f"text. It is read as TOML and, every {part['python_every']}th time, as Python dictionaries too; each must be "
         "planned, or refused with rule, field, value, remedy and the line of the file. Of those that are planned "
         f"{part['simulated']} were simulated to their end or to a failure with a reason.",
         "",
-        f"Every {part['python_every']}th good scene was also changed by dotted names (`soils.0.friction_angle`), one right "
-        "and up to two of any kind: unknown names, entries that are not there, units in strings, wrong types. "
+        f"Every {part['python_every']}th good scene was also changed by dotted names (`soils.0.friction_angle`), one "
+        "right and up to two of any kind: unknown names, entries that are not there, units in strings, wrong types. "
         "Where it was planned, the right one had its value in SI: "
         + ", ".join(f"{count} {name}" for name, count in part["dotted"].items())
         + ".",

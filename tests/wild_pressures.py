@@ -18,7 +18,8 @@ TIMES = {"s": 1, "ms": 1e3, "min": 1 / 60, "h": 1 / 3600, None: 1, "dates": 1, "
 STRESSES = {"Pa": 1, "kPa": 1e-3, "MPa": 1e-6, "kN m-2": 1e-3, "N/mm^2": 1e-6, "bar": 1e-5, None: 1}
 NO_UNITS = ("kg", "m", "9**9**9", "degC", "", "xyz", 5, "Pa; import os", "°C", "s s s", 3000 * "m", [1.0, 2.0])
 KINDS = (
-    "right", "right", "right", "theta in other units", "time without its units", "time in no units", "theta in no units",
+    "right", "right", "right", "theta in other units", "time without its units", "time in no units",
+    "theta in no units",
     "pressures in no units", "pressures in other units", "one pressure in other units", "compression negative",
     "soil negative", "gap", "half ring", "quarter", "few angles", "NaN", "infinite", "NaN angle", "NaN time",
     "angle twice", "angle twice, other values", "time twice", "times shuffled", "one missing", "text", "no time",
@@ -141,8 +142,9 @@ def _in_units(random, kind, given):
 def _written_times(random, kind, seconds):
     if kind == "strange dates":
         calendar = random.choice(("noleap", "360_day", "julian", "none", "xyz"))
-        units = random.choice(("days since 2026-03-01", "seconds since 0000-00-00", "s since", "months since 1999-01-01",
-                               "seconds since yesterday", "days since 99999-01-01"))  # fmt: skip
+        units = random.choice(("days since 2026-03-01", "seconds since 0000-00-00", "s since",
+                               "months since 1999-01-01", "seconds since yesterday",
+                               "days since 99999-01-01"))  # fmt: skip
         return "time", seconds, {"units": units, "calendar": calendar}
     if kind == "time without its units":
         return "time", seconds, {}

@@ -82,8 +82,9 @@ DOTTED = (
     "soils.\u0663.k0", "soils.0.name", "__class__.__init__", "box.width", "stop.inflow_mass",
 )  # fmt: skip
 VALUES = (
-    0, -1, 33, 0.5, 1e308, 10**400, float("nan"), True, None, "none", "33", "33 deg", "20 cm", "0,2 m", "20 kg", "", "x",
-    "1 m" * 50, "9**9**9 m", [], [1.0], [None], {}, {"a": 1}, {"0": 1}, {1: 2}, b"x", {1.0}, object(), (1, 2), 1j, print,
+    0, -1, 33, 0.5, 1e308, 10**400, float("nan"), True, None, "none", "33", "33 deg", "20 cm", "0,2 m", "20 kg", "",
+    "x", "1 m" * 50, "9**9**9 m", [], [1.0], [None], {}, {"a": 1}, {"0": 1}, {1: 2}, b"x", {1.0}, object(), (1, 2), 1j,
+    print,
 )  # fmt: skip
 
 
