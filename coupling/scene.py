@@ -98,6 +98,8 @@ class Scene(Input):
         data = self.mpm.model_dump(exclude_none=True, warnings=False)
         if self.ring is not None:
             data["ring"] = self.ring.model_dump(exclude_none=True, warnings=False)
+            if self.ring.ground is None:  # left out it would be derived
+                data["ring"]["ground"] = NONE
         return data
 
     def changed(self, **changes: Any) -> "Scene":
@@ -267,6 +269,8 @@ def make_scene(data: dict[str, Any], origin: str = "scene", layers: tuple[Layer,
             )
         else:
             derived = {} if mpm_scene is None else derived_ring(mpm_scene)
+            if ring_data.get("ground") == NONE:
+                ring_data = {**ring_data, "ground": None}
             ring_data, wrong = ring_in_si(ring_data)
             problems += wrong
             try:

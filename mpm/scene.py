@@ -429,7 +429,9 @@ class Scene(Part):
             for j, other in enumerate(self.tunnels[:k]):
                 gap = math.hypot(t.x - other.x, t.axis_depth - other.axis_depth) - t.outer_radius - other.outer_radius
                 if gap <= 0:
-                    raise ValueError(f"tunnels {j} and {k} overlap by {-gap:g} m; increase the axis spacing")
+                    raise ValueError(
+                        f"tunnels: {j} and {k} must lie apart, got an overlap by {-gap:g} m; increase the axis spacing"
+                    )
         if self.gate is not None:
             if self.gate.tunnel >= len(self.tunnels):
                 raise ValueError(
@@ -443,7 +445,9 @@ class Scene(Part):
                     f"inner diameter, {0.5 * t.inner_radius:g} m; check the unit (metres)"
                 )
         elif self.stop.inflow_mass is not None and self.stop.time is None:
-            raise ValueError("stop: inflow_mass is never reached without a gate; give stop.time or a gate")
+            raise ValueError(
+                "stop: must have a time, got an inflow_mass alone, never reached without a gate; give stop.time or a gate"
+            )
         if self.symmetry == "half" and self.asymmetry is not None:
             raise ValueError(
                 f"symmetry: 'half' must mirror the scene in x = 0, got {self.asymmetry}; write symmetry = 'auto'"

@@ -31,6 +31,16 @@ def test_any_scene_file_is_planned_or_refused_with_its_line(tmp_path_factory, se
     wild_scenes.judged(lambda: coupling.load_scene(file), "mine.toml", True)
 
 
+@FEW
+@given(seed=st.integers(0, 2**32))
+def test_any_dotted_change_is_planned_with_its_value_or_refused(seed):
+    changes, (name, expected) = wild_scenes.wild_changes(random.Random(seed))
+    verdict, _ = wild_scenes.judged(lambda: coupling.load_scene("quick", **changes), "quick", False)
+    if verdict != "refused":
+        found = wild_scenes.value_at(coupling.load_scene("quick", **changes), name)
+        assert found == pytest.approx(expected, rel=1e-12)
+
+
 ANYTHING = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=20) | st.binary(max_size=3),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8) | st.integers(), inner, max_size=3),

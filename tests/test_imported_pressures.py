@@ -1,11 +1,13 @@
 """Pressures of other programs and of measurements: read in their own units, or refused or warned of with the remedy."""
 
+import random
 import warnings
 
 import numpy as np
 import pytest
 import xarray as xr
 from test_cli import gush
+from wild_pressures import judged, wild_pressures
 
 import coupling
 import structure
@@ -197,3 +199,10 @@ def test_record_without_a_time_in_a_file_is_refused(tmp_path):
     data.to_netcdf(tmp_path / "mine.nc", engine="h5netcdf")
     with pytest.raises(RunFileError, match="time must be finite, got 1 values"):
         read_source(tmp_path / "mine.nc")
+
+
+def test_any_file_gives_what_was_meant_or_is_warned_of_or_refused(tmp_path):
+    for number in range(60):
+        given, true, kind = wild_pressures(random.Random(number))
+        given.assign_attrs(ring=RING.model_dump_json()).to_netcdf(tmp_path / "mine.nc", engine="h5netcdf")
+        judged(tmp_path / "mine.nc", true, kind)

@@ -364,3 +364,15 @@ def test_built_in_scene_begins_with_a_stress_that_its_soils_bear(name):
     for soil in scene.soils:
         lowest, highest = soil.admissible_k0(scene.vertical_stress(scene.box.depth))
         assert lowest < soil.k0 < highest
+
+
+def test_ring_without_ground_is_stored_as_such():
+    scene = coupling.load_scene("quick", **{"ring.ground": "none"})
+    assert scene.ring.ground is None and 'ground = "none"' in scene.source
+    assert coupling.scene.parse_scene(scene.source, "again") == scene == scene.changed(gravity=9.81)
+    assert coupling.load_scene("quick", **{"ring.ground": None}) == scene
+
+
+def test_entry_of_a_number_without_end_is_refused():
+    with pytest.raises(coupling.SceneError, match="must be a number below 1"):
+        coupling.load_scene("quick", **{"soils." + 5000 * "9" + ".k0": 0.5})
