@@ -165,7 +165,7 @@ def test_more_harmonics_than_the_lining_has_pairs_of_elements_are_refused():
 
 def test_overlapping_tunnels_are_refused():
     tunnel = coupling.load_scene("quick").mpm.tunnels[0].model_dump()
-    with pytest.raises(SceneError, match="tunnels 0 and 1"):
+    with pytest.raises(SceneError, match="tunnels: 0 and 1 must lie apart"):
         coupling.load_scene("quick", tunnels=[tunnel, {**tunnel, "x": 6.0}])
 
 
