@@ -446,7 +446,7 @@ class Scene(Part):
                 )
         elif self.stop.inflow_mass is not None and self.stop.time is None:
             raise ValueError(
-                "stop: must have a time, got an inflow_mass alone, never reached without a gate; give stop.time or a gate"
+                "stop: must have a time, got inflow_mass alone, never reached without a gate; give stop.time or a gate"
             )
         if self.symmetry == "half" and self.asymmetry is not None:
             raise ValueError(
