@@ -141,9 +141,9 @@ class RecordedSimulation:
         if share > MOST_UNBORNE:
             asked = math.ceil(100 * max(scene.bond_friction(tunnel) for tunnel in scene.tunnels)) / 100
             self.warn(
-                f"initial_contact = 'bonded' must be borne by tunnels.friction_coefficient, which bears {1 - share:.0%} of "
-                "its shear: the ground has slipped along the lining before the gate opens; give a coefficient of "
-                f"{asked:g} or more, or write initial_contact = 'frictional' if slip is meant"
+                "initial_contact = 'bonded' must be borne by tunnels.friction_coefficient, which bears "
+                f"{1 - share:.0%} of its shear: the ground has slipped along the lining before the gate opens; give a "
+                f"coefficient of {asked:g} or more, or write initial_contact = 'frictional' if slip is meant"
             )
         elif share > 0:
             log.info("initial state: friction does not bear %.1f %% of the bonded shear, which is let go", 100 * share)

@@ -237,6 +237,7 @@ class Simulation:
             "near": self._near,
             "reached": self._reached,
             "largest": json.dumps(self._largest),
+            "unborne_shear": self.unborne_shear,
             "done": self.done,
             "cpu_seconds": self.cpu_seconds,
         }
@@ -257,6 +258,7 @@ class Simulation:
         self._checked, self._near = int(state["checked"]), bool(state.get("near", True))
         self._reached, self.done = bool(state["reached"]), bool(state["done"])
         self._largest = json.loads(state["largest"])
+        self.unborne_shear = float(state.get("unborne_shear", 0.0))
         self._cpu_begin = clock.process_time() - float(state["cpu_seconds"])
         self._last_report = clock.monotonic(), self.solver.point_steps
 
