@@ -252,6 +252,7 @@ def features(scene: Scene, threads: int, why_alone: str = "one thread") -> list[
             bool(resting),
             f"coefficient {', '.join(resting)}" if resting else _frictionless(s),
         ),
+        ("slip along the lining before the gate opens", *_initial_slip(s)),
         ("tunnel interior", resolved, inside),
         (
             "pressure filter",
@@ -288,6 +289,15 @@ def _velocities(s):
 
 def _frictionless(s):
     return "coefficient 0: the wall takes the normal part only" if s.tunnels else "no tunnel"
+
+
+def _initial_slip(s):
+    """Whether the lining's friction does not bear the K0 stress of bonded ground, and why."""
+    short = [(s.bond_friction(t), t.friction_coefficient) for t in s.tunnels]
+    if not short:
+        return False, "no tunnel"
+    asked, given = max(short, key=lambda pair: pair[0] - pair[1])
+    return asked > given, f"K0 asks for a coefficient of {asked:.2g}, the lining has {given:g}"
 
 
 def _why_half(s):

@@ -118,7 +118,7 @@ def run(
         if remains is not None and remains.finished:
             remove_checkpoints(folder)
         else:
-            RecordedSimulation(chosen, folder, report, threads, checkpoint_interval, remains).run()
+            RecordedSimulation(chosen, folder, report, threads, checkpoint_interval, remains, _teller(warn)).run()
         try:
             finish(chosen, folder, report, figures if response is None else response, figures)
         finally:

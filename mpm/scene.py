@@ -364,6 +364,10 @@ class Scene(Part):
     symmetry : str
         "half" computes x >= 0 only and gives the results of the whole, "whole" computes both sides, "auto" is "half"
         where `asymmetry` finds nothing that forbids it. The rest are the tables of a scene file.
+    initial_contact : str
+        "bonded" begins with ground that sticks to the lining; where friction does not bear the shear of that, the
+        ground slips, drained, before the gate opens. "frictional" settles with friction at once: the same state, but
+        for a lining that moves.
     """
 
     name: str = Field(min_length=1, max_length=80, pattern=r"^\w[\w.-]*$")  # a folder's name
@@ -546,6 +550,19 @@ class Scene(Part):
     def lining_of(self, tunnel: Tunnel) -> str:
         """How a tunnel's lining stands in the ground: its own choice, else that of the scene."""
         return tunnel.lining or self.lining
+
+    def bond_friction(self, tunnel: Tunnel) -> float:
+        """Friction coefficient that bears the K0 stress on a bonded, held lining [-].
+
+        The largest shear over pressure at a circle, where tan(theta)^2 = 1 / K0: |1 - K0| / (2 sqrt(K0)).
+        """
+        crown, invert = tunnel.cover, tunnel.cover + tunnel.outer_diameter
+        beside = [
+            soil.k0
+            for soil, bottom in zip(self.soils, self._bottoms, strict=True)
+            if soil.top_depth < invert and bottom > crown
+        ]
+        return max(abs(1 - k0) / (2 * math.sqrt(k0)) for k0 in beside)
 
     def _check_lining(self, k, tunnel):
         kind = self.lining_of(tunnel)

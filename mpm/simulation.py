@@ -91,6 +91,9 @@ class Simulation:
     ----------
     done : bool
         Whether the stop criterion is reached and the last record returned.
+    unborne_shear : float
+        Share of the shear on the linings in the bonded initial state that friction does not bear, so that the ground
+        slips along them before the gate opens [-]; known after `begin`, 0 where `initial_contact` is "frictional".
     """
 
     def __init__(
@@ -102,7 +105,7 @@ class Simulation:
     ) -> None:
         self.scene = scene
         self.solver = Solver(scene, mesh if mesh is not None else build_mesh(scene), threads)
-        self.done = False
+        self.done, self.unborne_shear = False, 0.0
         self._cpu_begin = clock.process_time()
         self._interval, self._inside = 0, False  # number of the interval at hand; whether it has begun
         self._reached = False  # whether the last interval is at hand
@@ -129,6 +132,10 @@ class Simulation:
                 self._progress({"stage": "relax", "step": step, "residual": residual, "time": 0.0, "inflow_mass": 0.0})
 
         steps, residual = solver.relax(report)
+        if self.scene.initial_contact == "bonded" and residual <= numerics.relaxation_tolerance:
+            self.unborne_shear = solver.unborne_shear()
+            if self.unborne_shear > 0:
+                steps, residual = solver.let_slip(report)
         if residual > numerics.relaxation_tolerance:
             raise RunFailed(
                 f"the initial state did not settle: residual {residual:.2g} after {steps} steps, "
@@ -230,6 +237,7 @@ class Simulation:
             "near": self._near,
             "reached": self._reached,
             "largest": json.dumps(self._largest),
+            "unborne_shear": self.unborne_shear,
             "done": self.done,
             "cpu_seconds": self.cpu_seconds,
         }
@@ -250,6 +258,7 @@ class Simulation:
         self._checked, self._near = int(state["checked"]), bool(state.get("near", True))
         self._reached, self.done = bool(state["reached"]), bool(state["done"])
         self._largest = json.loads(state["largest"])
+        self.unborne_shear = float(state.get("unborne_shear", 0.0))
         self._cpu_begin = clock.process_time() - float(state["cpu_seconds"])
         self._last_report = clock.monotonic(), self.solver.point_steps
 

@@ -82,6 +82,7 @@ FEWEST_BETWEEN_SPECTRA, MOST_BETWEEN_SPECTRA, MOST_BETWEEN_SPECTRA_OF_LEVELS = 5
 MOST_AT_ONCE = 2_000_000  # point-steps after which compiled code comes back: some tenth of a second
 # Of the spectral step over that of the altitude. Beyond, a few points resist nothing where they are: no estimate.
 MOST_OVER_ALTITUDE = 4.0
+LEAST_BEYOND = 1e-3  # of the soil pressure, by which shear must exceed friction to count: more than relaxation leaves
 SMALLEST_PARALLEL = 4000  # elements; below it a second thread costs more than it brings
 
 
@@ -313,11 +314,29 @@ class Solver(Measures):
         self._mapped = True
 
     def relax(self, progress=None):
-        """Drained initial equilibrium; returns (steps, residual) and leaves the reactions in `impulse`."""
+        """Drained initial equilibrium by `initial_contact`; returns (steps, residual), leaves reactions in `impulse`.
+
+        Bonded ground may ask for more shear than friction bears (`unborne_shear`), which `let_slip` takes away.
+        """
+        bonded = self.scene.initial_contact == "bonded"
+        return self._relax(np.full_like(self.friction, np.inf) if bonded else self.friction, progress)
+
+    def unborne_shear(self):
+        """Share of the shear on the linings in the initial equilibrium that is beyond their friction [-]."""
+        beyond = total = 0.0
+        for part, tunnel in zip(self.lining_pressures(1.0), self.scene.tunnels, strict=True):
+            arc, pressure, shear = part["arc"], part["soil_pressure"], np.abs(part["soil_shear"])
+            excess = shear - tunnel.friction_coefficient * pressure
+            beyond += np.sum(arc * np.where(excess > LEAST_BEYOND * pressure, excess, 0.0))
+            total += np.sum(arc * shear)
+        return float(beyond / total) if beyond > 0.0 else 0.0
+
+    def let_slip(self, progress=None):
+        """Settle the equilibrium at hand once more, with the lining's friction instead of a bond; as `relax`."""
+        return self._relax(self.friction, progress)
+
+    def _relax(self, friction, progress):
         numerics = self.scene.numerics
-        friction = self.friction
-        if self.scene.initial_contact == "bonded":
-            friction = np.full_like(friction, np.inf)
         steps, residual, reaction = stages.relax(
             self, friction, numerics.relaxation_tolerance, numerics.max_relaxation_steps, progress
         )

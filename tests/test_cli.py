@@ -45,7 +45,7 @@ def simulated(monkeypatch):
 
     class Simulation:
         def __init__(self, scene, mesh, threads, progress):
-            self.count, self.done, self.progress = 0, False, progress
+            self.count, self.done, self.progress, self.unborne_shear = 0, False, progress, 0.0
 
         def begin(self):
             return self.advance(None)

@@ -11,11 +11,11 @@ def consolidate(cells, conductivity, bulk_modulus, time_factor, **settings):
     return result.error, result.values["time_step"]
 
 
-@pytest.mark.parametrize("time_factor, limit", [(0.1, 0.014), (0.5, 0.006)])
+@pytest.mark.parametrize("time_factor, limit", [(0.1, 0.014), (0.5, 0.007)])
 @pytest.mark.parametrize("conductivity, bulk_modulus", [(1e-3, 8e7), (1e-3, 2.2e8), (1e-4, 8e7), (3e-5, 2.2e8)])
 def test_terzaghi_profile_with_twenty_cells(conductivity, bulk_modulus, time_factor, limit):
-    # limits: what a strain-smoothed linear triangle reached in trials without the consistent filter
-    # at k = 1e-3 m/s waves are still there: inertia alone is up to 4 % then
+    # at k = 1e-3 m/s waves are still there, which inertia makes (up to 4 %) and `stress_damping` damps: 0.2 % at the
+    # later time without it, 0.6 % with it
     error, _ = consolidate(20, conductivity, bulk_modulus, time_factor, inertia=True)
     assert error < limit
 

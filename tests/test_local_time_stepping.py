@@ -114,7 +114,7 @@ def pulse_error(local, courant=0.8, coarse=0.4, fine=0.1):
     images at the free surface (same sign) and at the fixed bottom (opposite sign).
     """
     scene = box_scene("pulse", 0.4, 1.6, 24.0, {"model": "elastic"}, gravity=1e-9, courant=courant, pic_rate=0.0,
-                      local_time_stepping=local)  # fmt: skip
+                      stress_damping=0.0, local_time_stepping=local)  # fmt: skip
     solver = mpm.Solver(scene, graded_column(coarse, fine), threads=1)
     assert (solver.levels.count > 1) == local
     speed, start, length = solver.wave_speed, -15.0, 2.5

@@ -117,6 +117,7 @@ def test_every_attribute_of_the_solver_is_stored_built_or_scratch(scene, mesh):
         "_checked",
         "_near",
         "_largest",
+        "unborne_shear",
         "_reached",
     }
     assert begun == stored

@@ -215,16 +215,19 @@ def test_interrupted_study_leaves_no_process_behind(tmp_path):
 
     marks = [tmp_path / str(k) for k in range(2)]
     with pytest.raises(Stopped), Pool(2) as pool:
-        for ending in pool.run(sleeper, {k: (str(mark), 0.0 if k else 60.0) for k, mark in enumerate(marks)}):
+        for ending in pool.run(sleeper, {k: (str(mark), str(marks[0]) if k else None) for k, mark in enumerate(marks)}):
             stop(*ending)
     pids = [int(mark.read_text()) for mark in marks]
     assert not [pid for pid in pids if os.path.exists(f"/proc/{pid}")]
 
 
-def sleeper(mark, seconds):
-    with open(mark, "w") as file:
-        file.write(str(os.getpid()))
-    time.sleep(seconds)
+def sleeper(mark, until):
+    """Leave the number of the process, then wait for that of another one; without another for a minute."""
+    Path(f"{mark}.new").write_text(str(os.getpid()))
+    os.replace(f"{mark}.new", mark)
+    end = time.monotonic() + 60.0
+    while time.monotonic() < end and not (until and os.path.exists(until)):
+        time.sleep(0.01)
 
 
 def test_progress_of_all_cases_is_read_from_their_folders(tmp_path):
