@@ -434,7 +434,7 @@ def follow_points(
     left, origin : (n_points,) int32
         Those of each part from `first_left` on, `n_left` (n_parts,) int64 of them.
     contents : (n_elements, 5) float64, of `update_points`
-        Added: these points. Elements that they leave empty are not full.
+        Added: these points. Quadrilaterals that they leave empty are not full.
     Others as of `locate` and `update_order`.
 
     Returns
@@ -473,8 +473,9 @@ def follow_points(
     )
     for k in range(n_moved):
         e = moved_from[k]
-        if start[e + 1] == start[e]:
-            contents[e, E_FILL] = 0.0
+        first = e & ~3
+        if start[first + 4] == start[first]:
+            contents[first : first + 4, E_FILL] = 0.0
     return n_occupied, n_active, removed
 
 

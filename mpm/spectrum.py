@@ -73,7 +73,7 @@ def sum_points(
     """Sum the points of a range of elements in these and at the nodes.
 
     contents : (n_elements, 5) float64
-        How full the elements are (`mpm.transfer.fill_of_cell`).
+        With the share of their area that stresses count with (`mpm.transfer.fill_of_cell`).
     stiffened : (n_elements,) float64
         Factor of the stiffness of an element.
     undrained : bool

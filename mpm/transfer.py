@@ -80,7 +80,8 @@ from mpm.variables import (
 # Area spanned by the ways between the points' centres in opposite elements, over that of the quadrilateral, below which
 # they give no slope; 4/9 where they lie in the middle of their elements.
 UNKNOWN_SLOPE = 0.05
-NEARLY_FULL = 0.9  # volume of points over area from which a quadrilateral counts as ground without free surface
+# Volume of points over area from which a quadrilateral begins to count, and counts entirely, as one without free surface.
+HALF_FULL, FULL = 0.5, 0.75
 AHEAD = 16  # points whose rows are on the way into the cache: their order is known, the machine does not guess it
 
 
@@ -100,38 +101,60 @@ def gradients(g1x, g1y, g2x, g2y, v0x, v0y, v1x, v1y, v2x, v2y):
 
 
 @kernel_part
-def fill_of_cell(e, geometry, contents):
-    """How full the quadrilateral of an element is: volume of its points over its area, 0 below `NEARLY_FULL`.
+def fill_of_cell(first, geometry, contents):
+    """Share of its area that the stresses in a quadrilateral count with, 0: with the volume of its points.
 
-    In one that is full the mean stress of each triangle counts with the triangle's area times this, not with the volume
-    of the points that are in it by chance: of three points one that crosses an edge takes a third of the force along,
-    and the ground answers with stresses that differ by as much. 0 where one of the triangles holds no point.
+    Where ground is, the mean stress of each triangle counts with the triangle's area, not with the volume of the points
+    that are in it by chance: of three points one that crosses an edge takes a third of the force along, and the ground
+    answers with stresses that differ by as much. At a free surface the points of the quadrilateral count, evenly over
+    its triangles; from half full to three quarters the one passes into the other. One triangle may be empty
+    (`is_carried`), of two nothing is known.
+
+    first : int
+        First element of the quadrilateral.
 
     Source: mixed integration of the material point method, Al-Kafaji (2013), Formulation of a dynamic material point
-    method for geomechanical problems, section 4.3, and its limit of 90 %.
+    method for geomechanical problems, section 4.3, there from 90 % on.
     """
-    first = e & ~index(3)
     volume = area = 0.0
-    for k in range(4):
-        part = contents[first + index(k), E_VOLUME]
-        if part <= 0.0:
-            return 0.0
-        volume += part
-        area += geometry[first + index(k), 6]
-    return volume / area if volume > NEARLY_FULL * area else 0.0
+    empty = 0
+    for e in range(first, first + 4):
+        empty += contents[index(e), E_VOLUME] <= 0.0
+        volume += contents[index(e), E_VOLUME]
+        area += geometry[index(e), 6]
+    if empty > 1:
+        return 0.0
+    fill = min(volume / area, 1.0)
+    return fill + (1.0 - fill) * min(max((fill - HALF_FULL) / (FULL - HALF_FULL), 0.0), 1.0)
+
+
+@kernel_part
+def fill_cell(e, start, geometry, contents):
+    """Write `fill_of_cell` for all triangles of the quadrilateral of an element, if that is its first with points."""
+    first = e & ~index(3)
+    if start[first] == start[e]:
+        fill = fill_of_cell(first, geometry, contents)
+        for k in range(4):
+            contents[first + index(k), E_FILL] = fill
 
 
 @kernel
 def fill_cells(geometry, contents):
-    """Write how full all quadrilaterals are."""
-    for e in range(contents.shape[0]):
-        contents[e, E_FILL] = fill_of_cell(index(e), geometry, contents)
+    """Write `fill_of_cell` for all elements."""
+    for first in range(0, contents.shape[0], 4):
+        contents[first : first + 4, E_FILL] = fill_of_cell(index(first), geometry, contents)
 
 
 @inline_kernel
 def felt_share(volume, area, fill):
     """What the stresses of an element's points count with, over their volume."""
     return fill * area / volume if fill > 0.0 and volume > 0.0 else 1.0
+
+
+@inline_kernel
+def is_carried(e, start, fill):
+    """Whether an element without points has the stress of the triangle before it, since there is ground around it."""
+    return fill > 0.0 and start[e] == start[e + 1]
 
 
 @kernel_part
@@ -223,7 +246,7 @@ def advance_kernel(wet, undrained, tied):
             x0, y0 = geometry[e, 4], geometry[e, 5]
             a, b, c = index(rows[e, 0]), index(rows[e, 1]), index(rows[e, 2])
             touched[a] = touched[b] = touched[c] = 1
-            contents[e, E_FILL] = fill_of_cell(e, geometry, contents)
+            fill_cell(e, start, geometry, contents)
             border = tied and max(a, b, c) >= n_nodes
             jx0 = jx1 = jx2 = jy0 = jy1 = jy2 = 0.0
             if border:
@@ -470,11 +493,7 @@ def update_kernel(wet, undrained, plastic, tied):
                         points[i, SXX] = points[i, SYY] = points[i, SZZ] = points[i, SXY] = 0.0
                         n_suspended += 1
                     else:
-                        if wet:
-                            p -= bulk_liquid / n * ((1.0 - n) * expansion + n * expansion_liquid)
-                            points[i, P] = p
-                            if p < 0.0:
-                                n_cavitated += 1
+                        void = n
                         n = 1.0 - (1.0 - n) / (1.0 + expansion)
                         if n < POROSITY_FLOOR:
                             n = POROSITY_FLOOR
@@ -482,6 +501,13 @@ def update_kernel(wet, undrained, plastic, tied):
                         elif n > POROSITY_CEILING:
                             n = POROSITY_CEILING
                             n_ceiling += 1
+                        if wet:
+                            # the water held, n V (1 + p / K_w), changes by n V (div v_s - div v_l) dt
+                            p = void * (p - bulk_liquid * expansion_liquid) - (1.0 - void) * bulk_liquid * expansion
+                            p /= n * (1.0 + expansion)
+                            points[i, P] = p
+                            if p < 0.0:
+                                n_cavitated += 1
                         points[i, N] = n
                         if n >= soils[s, S_LOOSE]:
                             points[i, SXX] = points[i, SYY] = points[i, SZZ] = points[i, SXY] = 0.0
@@ -559,6 +585,15 @@ def update_kernel(wet, undrained, plastic, tied):
                 fxy += ahead[e] * (fxy - bxy)
                 fp += ahead[e] * (fp - bp)
             add_forces(g1x, g1y, g2x, g2y, fxx, fyy, fxy, fp, a, b, c, sums)
+            beside = (e & ~index(3)) + ((e + index(1)) & index(3))
+            if is_carried(beside, start, contents[e, E_FILL]):
+                share = geometry[beside, 6] / geometry[e, 6]
+                a, b, c = index(rows[beside, 0]), index(rows[beside, 1]), index(rows[beside, 2])
+                touched[a] = touched[b] = touched[c] = 1
+                add_forces(
+                    geometry[beside, 0], geometry[beside, 1], geometry[beside, 2], geometry[beside, 3], share * fxx,
+                    share * fyy, share * fxy, share * fp, a, b, c, sums,
+                )  # fmt: skip
         clamps[C_SUSPENDED] += n_suspended
         clamps[C_CAVITATED] += n_cavitated
         clamps[C_FLOOR] += n_floor
@@ -580,7 +615,7 @@ def map_kernel(wet, undrained, tied):
 
         row, soil, corner, geometry : one row of points, soils, elements and geometry.
         fill : float
-            Of the element (`fill_of_cell`). One in full ground has its stress from the points that stayed.
+            Of the element (`fill_of_cell`); above 0 its stress is that of the points that stayed.
         Returns its larger squared speed [m2/s2].
         """
         dx = row[X] - geometry[4]

@@ -37,8 +37,8 @@ BUFFER_WIDTH = 12
 NODE_WIDTH = 10
 NODAL_MOMENTA = 4  # what `advance_points` sums at a node
 
-# Element row: volume of its points, and times it their pore pressure and position; how full its quadrilateral was at
-# the end of the last step, 0 below `mpm.transfer.NEARLY_FULL`.
+# Element row: volume of its points, and times it their pore pressure and position; the share of its area that its
+# stress counts with (`mpm.transfer.fill_of_cell`), as of the end of the last step.
 (E_VOLUME, E_PRESSURE, E_X, E_Y, E_FILL) = range(5)
 ELEMENT_CONTENTS = 5
 

@@ -8,16 +8,16 @@ import coupling
 import mpm
 from mpm.scene import Scene
 from mpm.solver import Solver
-from mpm.variables import B_FLX, B_FLY, B_FX, B_FY, SXX, SXY, SYY, SZZ, N, P, X, Y
+from mpm.variables import B_FLX, B_FLY, B_FX, B_FY, CLAMPS, SXX, SXY, SYY, SZZ, VLX, VLY, VSX, VSY, N, P, X, Y
 
 
-def full_box(**numerics):
+def full_box(drainage="two-phase", **numerics):
     """A closed box full of weightless sand and water without stress, 2 m by 1 m."""
     scene = Scene.model_validate({
         "name": "box",
         "gravity": 1e-9,
         "box": {"width": 2.0, "depth": 1.0},
-        "water": {"table_depth": 0.0, "density": 1000.0, "bulk_modulus": 8e7},
+        "water": {"table_depth": 0.0, "density": 1000.0, "bulk_modulus": 8e7, "drainage": drainage},
         "soils": [{
             "name": "sand", "top_depth": 0.0, "model": "elastic", "youngs_modulus": 4e7, "poissons_ratio": 0.3,
             "cohesion": 0.0, "friction_angle": 30.0, "dilatancy_angle": 0.0, "porosity": 0.45, "loose_porosity": 0.55,
@@ -78,8 +78,25 @@ def test_filter_moves_no_node():
     assert np.abs(solver.nodal_sums()[:, [B_FLX, B_FLY]] - force).max() < 1e-8 * np.abs(force).max()
 
 
-def test_even_stress_pushes_no_inner_node_however_points_are_shared_among_triangles():
-    """Equilibrium is a matter of the stress alone: of three points that cross an edge none takes force along."""
+def test_points_keep_their_water_however_they_are_strained():
+    """Where water moves with the grains n V (1 + p / K_w) of a point stays what it is."""
+    solver = full_box(drainage="undrained", pressure_filter=0.0)
+    rng = np.random.default_rng(4)
+    rows = solver.points
+    rows[:, VSX] = rows[:, VLX] = 30.0 * rng.standard_normal(solver.n_points)
+    rows[:, VSY] = rows[:, VLY] = 30.0 * rng.standard_normal(solver.n_points)
+    before, volume = solver._held_water(solver._pore_water()), solver._volumes()
+    for _ in range(20):
+        solver.step(2e-5)
+    assert np.abs(solver._volumes() / volume - 1).max() > 0.01
+    assert rows[:, P].min() < 0.0 < rows[:, P].max()
+    assert solver.clamps.sum(axis=0)[[list(CLAMPS).index(name) for name in ("porosity_floor", "porosity_ceiling")]].sum() == 0
+    assert np.abs(solver._held_water(solver._pore_water()) / before - 1).max() < 1e-12
+
+
+@pytest.mark.parametrize("moved", [1, 3], ids=["one-of-three", "all-three"])
+def test_even_stress_pushes_no_inner_node_however_points_are_shared_among_triangles(moved):
+    """Equilibrium is a matter of the stress alone: points that cross an edge take no force along, nor does the last."""
     solver = full_box(stress_damping=0.0)
     rows = solver.points
     rows[:, SXX], rows[:, SYY], rows[:, SXY] = -1e5, -2e5, 3e4
@@ -87,9 +104,8 @@ def test_even_stress_pushes_no_inner_node_however_points_are_shared_among_triang
     rng = np.random.default_rng(2)
     weight = rng.dirichlet((1.0, 1.0, 1.0), solver.n_points)
     rows[:, X : Y + 1] = np.einsum("pk,pkd->pd", weight, corner)
-    given = (solver.element_of_point % 4 == 0) & (
-        np.arange(solver.n_points) % 3 == 0
-    )  # one of three goes to the next triangle of its cell
+    # of the three in a triangle some go to the next one of its quadrilateral
+    given = (solver.element_of_point % 4 == 0) & (np.arange(solver.n_points) % 3 < moved)
     assert given.any()
     solver.element_of_point[given] += 1
     rows[given, X : Y + 1] = solver.mesh.nodes[solver.mesh.elements[solver.element_of_point[given]]].mean(axis=1)
