@@ -159,7 +159,8 @@ class Measures:
         -------
         dict
             flow_momentum [N s/m]: sum of the sizes of the momenta of grains and water, flow_energy [J/m]: their kinetic
-            energy, and flow_water [kg/m], of the points of the flow zone, those taken out included; water_inflow
+            energy, and flow_water [kg/m], of the points of the flow zone, those taken out included; flow_energy has in
+            it what the fall from the gate gave those that came through, who lose it where they land; water_inflow
             [kg/m]: water that came through the outer face of the gate, that taken out included; material_volume,
             flow_volume [m2]: volume of all points in the mesh, and of those of the flow zone; overlap_volume,
             flow_overlap_volume [m2]: what the cells hold beyond their area, of all points and of those of the flow
@@ -178,7 +179,7 @@ class Measures:
         flow_beyond = beyond * np.divide(flowing, in_cell, out=np.zeros_like(area), where=in_cell > 0)
         amounts = {
             "flow_momentum": momenta[flows].sum(),
-            "flow_energy": self._kinetic_energies(wet)[flows].sum(),
+            "flow_energy": self._kinetic_energies(wet)[flows].sum() + self._energy_of_the_fall(wet),
             "flow_water": held[flows].sum(),
             "water_inflow": held[self._past_the_gate()].sum(),
             "material_volume": in_cell.sum(),
@@ -187,6 +188,16 @@ class Measures:
             "flow_overlap_volume": flow_beyond.sum(),
         }
         return {name: self.copies * float(amount) for name, amount in amounts.items()}
+
+    def _energy_of_the_fall(self, wet):
+        """What gravity has done on grains and water below the gate that came through it [J/m]."""
+        if self.scene.gate is None:
+            return 0.0
+        tunnel = self.scene.tunnels[self.scene.gate.tunnel]
+        gate = tunnel.outer_radius * np.cos(np.radians(self.scene.gate.angle)) - tunnel.axis_depth
+        past = self._past_the_gate()
+        fall = np.maximum(gate - self.points[past, Y], 0.0)
+        return np.sum((self.points[past, MASS] + wet[past]) * fall) * self.scene.gravity
 
     def _past_the_gate(self):
         """Whether a point is inside the outer face of the gate's tunnel, or was taken out there."""

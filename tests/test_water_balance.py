@@ -90,7 +90,10 @@ def test_points_keep_their_water_however_they_are_strained():
         solver.step(2e-5)
     assert np.abs(solver._volumes() / volume - 1).max() > 0.01
     assert rows[:, P].min() < 0.0 < rows[:, P].max()
-    assert solver.clamps.sum(axis=0)[[list(CLAMPS).index(name) for name in ("porosity_floor", "porosity_ceiling")]].sum() == 0
+    assert (
+        solver.clamps.sum(axis=0)[[list(CLAMPS).index(name) for name in ("porosity_floor", "porosity_ceiling")]].sum()
+        == 0
+    )
     assert np.abs(solver._held_water(solver._pore_water()) / before - 1).max() < 1e-12
 
 
