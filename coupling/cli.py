@@ -1,4 +1,4 @@
-"""The command line `gush`. Commands that show results or measure the program stand in modules of their own.
+"""The command line `gush`. Commands that show results, and those that packages join, stand in modules of their own.
 
 Exit codes: 0 done, 1 rerun differs, 2 refused input, 3 run failed, 130 interrupted. Heavy libraries load inside the
 commands.
@@ -14,12 +14,13 @@ from rich.table import Table
 
 from coupling.events import EventStream
 from coupling.exit_codes import DIFFERENT, JsonPath, checked_json, failures, told_warnings, warn, write_json
-from coupling.measure_commands import accuracy_command, bench_command, stability_command, study_command
+from coupling.joined_commands import JoinedCommands
 from coupling.progress_line import ProgressLine, duration
-from coupling.published.command import figures_command, published_command
 from coupling.result_commands import export_command, info_command, report_command
+from coupling.study_command import study_command
 
 app = typer.Typer(
+    cls=JoinedCommands,
     add_completion=False,
     no_args_is_help=True,
     rich_markup_mode=None,
@@ -321,12 +322,7 @@ def scenes_command(json_path: JsonPath = None):
 app.command("report")(report_command)
 app.command("export")(export_command)
 app.command("info")(info_command)
-app.command("bench")(bench_command)
-app.command("accuracy")(accuracy_command)
 app.command("study")(study_command)
-app.command("figures")(figures_command)
-app.command("published")(published_command)
-app.command("stability")(stability_command)
 
 
 def main():

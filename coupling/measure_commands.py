@@ -1,4 +1,4 @@
-"""Commands of `gush` that measure the program or many scenes: accuracy, stability, study."""
+"""Commands of `gush` that measure the program: accuracy, bench, stability."""
 
 from pathlib import Path
 from typing import Annotated
@@ -122,55 +122,9 @@ def stability_command(
         complain("\n".join(data["faults"]), FAILED)
 
 
-def study_command(
-    study: Annotated[
-        str, typer.Argument(help="A built-in study (table-2, sensitivity, permeability, mesh, backend) or a TOML file.")
-    ],
-    out: Annotated[
-        Path | None, typer.Option(help="Folder; studies/NAME when left out. What is there is not rerun.")
-    ] = None,
-    workers: Annotated[int | None, typer.Option(min=0, help="Processes; all cores when left out, 0: this one.")] = None,
-    scheduler: Annotated[str | None, typer.Option(help="Address of a running dask scheduler to use instead.")] = None,
-    json_path: JsonPath = None,
-):
-    """Run many scenes that differ in some parameters, in parallel; one dataset of them all. Rerun to resume.
-
-    JSON: keys of `coupling.studies.command.run_study`.
-    """
-    with failures(), checked_json(json_path):
-        from coupling.studies.command import run_study
-
-        data = run_study(study, out, workers, scheduler, Console(stderr=True))
-        write_json(json_path, data)
-        if str(json_path) != "-":
-            console = Console()
-            console.print(_study_table(data))
-            console.print(f"data: {data['data']}", highlight=False, soft_wrap=True)
-        if any(case["status"] == "failed" for case in data["cases"]):
-            raise typer.Exit(FAILED)
-
-
 def _accuracy_table(data):
     table = Table("problem", "error", "limit", "CPU s", "default over the best of what costs no more")
     for name, row in data["problems"].items():
         limit = f"{row['limit']:.2g}" if row["within"] else f"[red]{row['limit']:.2g} exceeded[/red]"
         table.add_row(name, f"{row['error']:.2e}", limit, f"{row['cpu_seconds']:.2f}", f"{row['excess']:.2f}")
-    return table
-
-
-def _study_table(data):
-    table = Table(title=f"{data['study']}{', ' + data['model'] if data['model'] else ''}")
-    table.add_column("case", min_width=min(22, max(len(case["name"]) for case in data["cases"])))
-    for head in ("kg/m", "after s", "N max kN/m", "M kN m/m", "CPU s"):
-        table.add_column(head, no_wrap=True)
-    table.add_column("status")
-    for case in data["cases"]:
-        cells = [""] * 5
-        if case["status"] == "finished":
-            force, moment = case["axial_force"], case["bending_moment"]
-            cells = [f"{case['inflow_mass']:.4g}", f"{case['time']:.3g}"]
-            cells += [f"{force['max'] / 1e3:.0f}" if force else "-"]
-            cells += [f"{moment['min'] / 1e3:.0f} to {moment['max'] / 1e3:.0f}" if moment else "-"]
-            cells += [f"{case['cpu_seconds']:.1f}"]
-        table.add_row(case["name"], *cells, case["message"] or case["status"])
     return table

@@ -62,7 +62,8 @@ def commands():
 
     group = typer.main.get_command(app)
     parts = []
-    for name, command in group.commands.items():
+    for name in group.list_commands(None):
+        command = group.get_command(None, name)
         context = typer.Context(command, info_name=f"gush {name}")
         text = command.get_help(context)
         parts.append(f"## gush {name}\n\n```text\n{_plain(text)}\n```\n")

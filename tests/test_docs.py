@@ -68,10 +68,11 @@ def parse(words, place):
     """Fail unless `gush` knows the command and all its options."""
     group = typer.main.get_command(app)
     name, *rest = words[1:]
-    assert name in group.commands or name in ("--version", "--help"), f"{place}: gush {name}: no such command"
+    command = group.get_command(None, name)
+    assert command or name in ("--version", "--help"), f"{place}: gush {name}: no such command"
     try:
-        if name in group.commands:
-            group.commands[name].make_context(name, rest)
+        if command:
+            command.make_context(name, rest)
     except typer.Exit as done:
         assert done.exit_code == 0, place
     except Exception as problem:  # whatever class the parser has in this version of typer
