@@ -14,7 +14,7 @@ sdist=("$work"/dist/*.tar.gz)
 python="$(uv python find)"
 "$python" -m zipfile --list "${wheel[0]}" | awk 'NR > 1 {print $1}' | sort >"$work/in-wheel"
 tar --list --file "${sdist[0]}" | sed 's|^[^/]*/||' | sort >"$work/in-sdist"
-find mpm structure coupling -type f ! -name '*.pyc' | sort >"$work/needed"
+find mpm structure coupling verification -type f ! -name '*.pyc' | sort >"$work/needed"
 for list in in-wheel in-sdist; do
     if ! comm -23 "$work/needed" "$work/$list" >"$work/missing" || [ -s "$work/missing" ]; then
         echo "not in the ${list#in-}:" && cat "$work/missing" && exit 1
@@ -30,8 +30,9 @@ uv pip install --quiet --python "$work/venv" --only-binary :all: "${wheel[0]}"
 cd "$work"
 run=(env -i HOME="$work" PATH="$work/venv/bin" LANG=C.UTF-8)
 "${run[@]}" gush --version
-"${run[@]}" python -W error -c "import mpm, structure, coupling"
+"${run[@]}" python -W error -c "import mpm, structure, coupling, verification.commands"
 "${run[@]}" gush scenes >/dev/null
+"${run[@]}" gush accuracy --help >/dev/null # a command that joins
 "${run[@]}" python -W error - <<'EOF'
 from importlib import resources
 

@@ -8,11 +8,11 @@ import xarray as xr
 from test_cli import gush
 
 import coupling
-from coupling.accuracy.ladder_report import write_ladder
-from coupling.accuracy.ladders import assess, dataset, measure
-from coupling.accuracy.mesh_ladder import refined
-from coupling.accuracy.orders import excess_over_front, extrapolate, observed_order, pareto_front
-from coupling.verification.problem import Problem, Result
+from verification.accuracy.ladder_report import write_ladder
+from verification.accuracy.ladders import assess, dataset, measure
+from verification.accuracy.mesh_ladder import refined
+from verification.accuracy.orders import excess_over_front, extrapolate, observed_order, pareto_front
+from verification.problems.problem import Problem, Result
 
 
 def solve(cells=8, courant=0.5, friction_angle=30.0):
@@ -84,7 +84,7 @@ def test_ladder_measures_orders_front_and_failures():
 
 
 def test_command_writes_page_data_and_pictures(tmp_path, monkeypatch):
-    monkeypatch.setattr("coupling.verification.problems", lambda: {"parabola": PROBLEM})
+    monkeypatch.setattr("verification.problems.problems", lambda: {"parabola": PROBLEM})
     result = gush("accuracy", "--out", tmp_path, "--json", tmp_path / "data.json")
     assert result.exit_code == 0, result.output
     data = json.loads((tmp_path / "data.json").read_text())

@@ -7,10 +7,10 @@ import pytest
 from small_event import small_scene
 
 import mpm
-from coupling.bench import layout, processes
-from coupling.bench.command import bench
-from coupling.bench.sizes import slope
-from coupling.bench.stepping import configurations, kernel_times, prepared
+from verification.speed import layout, processes
+from verification.speed.command import bench
+from verification.speed.sizes import slope
+from verification.speed.stepping import configurations, kernel_times, prepared
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from coupling.verification.columns import terzaghi
+from verification.problems.columns import terzaghi
 
 
 def consolidate(cells, conductivity, bulk_modulus, time_factor, **settings):

@@ -7,9 +7,9 @@ from small_event import COARSE
 
 import coupling
 import mpm
-from coupling.stability.amplification import Column
 from mpm.points import initial_stress
 from mpm.variables import SXX, SXY, VLY, VSX, X0, Y0, P, Y
+from verification.stability.amplification import Column
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,10 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 FORBIDDEN = {
-    "mpm": {"structure", "coupling", "xarray", "matplotlib", "skfem", "h5netcdf"},
-    "structure": {"mpm", "coupling"},
+    "mpm": {"structure", "coupling", "verification", "xarray", "matplotlib", "skfem", "h5netcdf"},
+    "structure": {"mpm", "coupling", "verification"},
+    "coupling": {"verification"},
+    "verification": {"tests", "examples"},
 }
 HEAVY = ("numba", "xarray", "matplotlib", "scipy", "gmsh", "skfem", "pint", "dask", "distributed", "h5py", "meshio")
 
@@ -43,10 +45,11 @@ def test_import_directions(package):
         "import mpm",
         "import structure",
         "import coupling",
+        "import verification.commands",
         "from typer.testing import CliRunner; import coupling.cli as c; "
         "import sys; sys.argv = ['gush', '--help']\ntry: c.main()\nexcept SystemExit as e: assert not e.code",
     ],
-    ids=["mpm", "structure", "coupling", "gush --help"],
+    ids=["mpm", "structure", "coupling", "verification", "gush --help"],
 )
 def test_light_imports_load_no_heavy_library(code):
     check = f"\nimport sys\nprint('HEAVY', *[name for name in {HEAVY!r} if name in sys.modules])"

@@ -6,10 +6,10 @@ from small_event import COARSE
 
 import coupling
 import mpm
-from coupling.stability.monitor import kinetic_energy
-from coupling.verification.boxes import box_mesh
-from coupling.verification.driven import box_scene
 from mpm.variables import MASS, S_RHO_S, VLX, VLY, VSX, VSY, N, X, Y
+from verification.problems.boxes import box_mesh
+from verification.problems.driven import box_scene
+from verification.stability.monitor import kinetic_energy
 
 GRADED = {**COARSE, "size_growth": 0.3}
 

@@ -9,7 +9,7 @@ import coupling
 from coupling import progress_line
 from coupling.datasets import RunFileError, read_response
 from coupling.progress_line import ProgressLine
-from coupling.stability import command as stability_command
+from verification.stability import command as stability_command
 
 assert simulated  # a fixture
 

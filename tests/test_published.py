@@ -10,13 +10,13 @@ from test_cli import gush
 
 import coupling
 from coupling.postprocess import with_inflow
-from coupling.published.answers import twin_answers
-from coupling.published.evidence import RunEvidence, initial_theory, mirror_difference
-from coupling.published.page import write_page
-from coupling.published.run_all import plans
-from coupling.published.sensitivity_figure import changes, sensitivity_figure
-from coupling.published.sources import at_study_inflow, published_numbers
 from structure.theory import theoretical_pressures
+from verification.published.answers import twin_answers
+from verification.published.evidence import RunEvidence, initial_theory, mirror_difference
+from verification.published.page import write_page
+from verification.published.run_all import plans
+from verification.published.sensitivity_figure import changes, sensitivity_figure
+from verification.published.sources import at_study_inflow, published_numbers
 
 FIXED = {f"discretisation.{name}": value for name, value in COARSE.items()} | {
     "numerics.relaxation_tolerance": 1e-3,

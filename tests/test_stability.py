@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from coupling.stability.amplification import Amplification, Column
-from coupling.stability.cases import cases
-from coupling.stability.extremes import BUG, STABLE, Case, judge, judge_apart
-from coupling.stability.linear import critical_map
-from coupling.stability.trials import box_of, box_scene
 from mpm.solver import Solver
+from verification.stability.amplification import Amplification, Column
+from verification.stability.cases import cases
+from verification.stability.extremes import BUG, STABLE, Case, judge, judge_apart
+from verification.stability.linear import critical_map
+from verification.stability.trials import box_of, box_scene
 
 REPRESENTATIVE = [name for name, case in cases().items() if case.representative]
 COLUMNS = {
@@ -102,8 +102,8 @@ def test_a_dozen_extremes_are_representative():
 
 def test_energy_from_nothing_is_found():
     # grains that are pushed on behind the back of the solver: a per cent of their velocity each step
-    from coupling.stability.extremes import follow
-    from coupling.stability.monitor import Monitor
+    from verification.stability.extremes import follow
+    from verification.stability.monitor import Monitor
 
     class Pushed(Solver):
         def step(self, dt_max=math.inf):

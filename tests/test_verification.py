@@ -4,10 +4,10 @@ import inspect
 
 import pytest
 
-from coupling.accuracy.orders import observed_order
-from coupling.verification import problems
-from coupling.verification.exact_plasticity import exact_path, stiffness, yield_planes
 from mpm.scene import Numerics
+from verification.accuracy.orders import observed_order
+from verification.problems import problems
+from verification.problems.exact_plasticity import exact_path, stiffness, yield_planes
 
 MINE = list(problems().values())
 

@@ -1,0 +1,158 @@
+"""Ladders of settings over verification problems: error against processor time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+
+from verification.accuracy.orders import excess_over_front, observed_order, pareto_front
+from verification.problems.problem import Problem
+
+#: Settings that count something: their mesh size or time step is one over the value.
+COUNTS = ("cells", "elements", "columns", "rows", "across", "steps", "increments", "points_per_element", "points")
+#: Settings that are a mesh size or a time step.
+SIZES = ("size", "element_size", "spacing", "courant", "dt", "time_step")
+#: Settings of verification problems that pose another problem.
+POSED = (
+    "aspect", "conductivity", "duration", "friction", "height", "inertia", "periods", "repose", "rough", "rough_base",
+    "settlement", "share", "slope", "stiffness", "strain", "time_factor", "times", "turn", "cover", "release", "mode",
+)  # fmt: skip
+#: Errors at or below this are round-off: nothing can be gained there.
+ROUND_OFF = 1e-12
+
+
+def measure(problem: Problem, only_fast: bool = False, progress: Callable[[str], None] | None = None) -> list[dict]:
+    """Run a problem with its fast setting, then with every value of every ladder, all else as in the fast one.
+
+    The fast setting runs twice and the second counts: compiling is no cost of a method.
+
+    Returns
+    -------
+    list of dict
+        problem, setting ("default" for the fast setting), value, error [-], cpu_seconds [s], steps, points,
+        values (further numbers, SI). A run that fails has error NaN and `failure`, its message.
+    """
+    tell = progress if progress is not None else lambda line: None
+    problem.solve(**problem.fast)
+    rows = [_row(problem, "default", None, {})]
+    tell(_line(rows[-1]))
+    for setting, values in {} if only_fast else problem.ladder.items():
+        for value in values:
+            if value == problem.fast.get(setting):
+                rows.append(rows[0] | {"setting": setting, "value": value})
+                continue
+            rows.append(_row(problem, setting, value, {setting: value}))
+            tell(_line(rows[-1]))
+    return rows
+
+
+def _row(problem, setting, value, changes):
+    row = {"problem": problem.name, "setting": setting, "value": value}
+    try:
+        result = problem.solve(**(problem.fast | changes))
+    except (ArithmeticError, RuntimeError) as failure:
+        return row | _nothing(str(failure))
+    return row | {
+        "error": float(result.error),
+        "cpu_seconds": float(result.cpu_seconds),
+        "steps": int(result.steps),
+        "points": int(result.points),
+        "values": {name: float(number) for name, number in result.values.items()},
+        "failure": "",
+    }
+
+
+def _nothing(message):
+    return {
+        "error": math.nan,
+        "cpu_seconds": math.nan,
+        "steps": 0,
+        "points": 0,
+        "values": {},
+        "failure": message,
+    }
+
+
+def _line(row):
+    what = row["problem"] if row["value"] is None else f"{row['problem']}, {row['setting']} = {row['value']}"
+    return f"{what}: " + (row["failure"] or f"error {row['error']:.3g}, {row['cpu_seconds']:.2f} s CPU")
+
+
+def assess(rows: Iterable[dict]) -> dict:
+    """Orders of the ladders of one problem, its Pareto front, and where the default lies.
+
+    Returns
+    -------
+    dict
+        orders : setting that is a mesh size, a time step or a count to the observed order;  front : (n_rows,) bool,
+        among numerical choices only: another friction angle is another problem, not a cheaper method;  excess : error
+        of the default over the best error of what costs no more, 1 where it is round-off.
+    """
+    rows = list(rows)
+    physical = physical_settings()
+    known = [k for k, row in enumerate(rows) if math.isfinite(row["error"]) and row["setting"] not in physical]
+    front = [False] * len(rows)
+    if known:
+        for k, best in zip(known, pareto_front(*_costs(rows, known)), strict=True):
+            front[k] = bool(best)
+    orders = {}
+    for setting in dict.fromkeys(row["setting"] for row in rows if row["value"] is not None):
+        if setting not in (*COUNTS, *SIZES):
+            continue
+        mine = [row for row in rows if row["setting"] == setting and row["error"] > ROUND_OFF]
+        numbers = [row["value"] for row in mine]
+        sizes = [(1 / n if setting in COUNTS else n) if n > 0 else math.nan for n in numbers]
+        orders[setting] = observed_order(sizes, [row["error"] for row in mine])
+    first = next((k for k, i in enumerate(known) if rows[i]["setting"] == "default"), None)
+    excess = math.nan if first is None else excess_over_front(*_costs(rows, known), first)
+    if first is not None and rows[known[first]]["error"] <= ROUND_OFF:
+        excess = 1.0
+    return {"orders": orders, "front": front, "excess": excess}
+
+
+def physical_settings() -> set[str]:
+    """Names of settings that pose another problem and are no numerical choice; K_w is both and stays out."""
+    from mpm.scene import Soil, Water
+
+    return {*Soil.model_fields, *Water.model_fields, *POSED} - {"bulk_modulus"}
+
+
+def _costs(rows, known):
+    return [rows[k]["cpu_seconds"] for k in known], [rows[k]["error"] for k in known]
+
+
+def dataset(rows: Iterable[dict]):
+    """All runs of all problems as a dataset over `run`.
+
+    Returns
+    -------
+    xarray.Dataset
+        problem, setting, value (as text), error [-], cpu_seconds [s], steps, points, on_front (run).
+    """
+    import numpy as np
+    import xarray as xr
+
+    rows = list(rows)
+    front = {}
+    for name in dict.fromkeys(row["problem"] for row in rows):
+        mine = [k for k, row in enumerate(rows) if row["problem"] == name]
+        front |= dict(zip(mine, assess(rows[k] for k in mine)["front"], strict=True))
+
+    def column(key, units, long_name, convert=lambda value: value):
+        values = np.array([convert(row[key]) for row in rows])
+        return "run", values, {"units": units, "long_name": long_name}
+
+    return xr.Dataset(
+        {
+            "error": column("error", "1", "error in the norm of the problem"),
+            "cpu_seconds": column("cpu_seconds", "s", "processor time of stepping"),
+            "steps": column("steps", "1", "time steps"),
+            "points": column("points", "1", "material points"),
+            "on_front": ("run", np.array([front[k] for k in range(len(rows))], np.int8), {"units": "1"}),
+        },
+        coords={
+            "problem": column("problem", "1", "verification problem"),
+            "setting": column("setting", "1", "what was changed; 'default': nothing"),
+            "setting_value": column("value", "1", "its value", lambda value: "" if value is None else str(value)),
+        },
+    )

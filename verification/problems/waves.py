@@ -1,0 +1,145 @@
+"""Standing compression waves in a column: one phase, undrained, both waves of two phases, damped by drag."""
+
+import math
+
+import numpy as np
+
+from mpm.solver import Solver
+from mpm.variables import SXX, SYY, SZZ, VLY, VSY, P, Y
+from verification.problems.boxes import box_mesh
+from verification.problems.columns import DRAINAGE, column
+from verification.problems.driven import box_scene
+from verification.problems.problem import NUMERICS, WET, Problem, Result, Stopwatch, register
+from verification.problems.two_phase import YOUNG, exact_velocities, modes
+from verification.stability.monitor import kinetic_energy, strain_energy
+
+HEIGHT = 10.0  # [m]
+
+
+def two_phase_wave(
+    cells=20, conductivity=1.0, bulk_modulus=8e7, mode="fast", periods=2.0, drainage="two-phase",
+    **numerics,
+):  # fmt: skip
+    """Quarter of a standing wave in a column of 10 m, fixed at the bottom, free at the top, under its own weight.
+
+    mode : "fast", "slow" or "together" (grains and water start with one velocity); periods : of the undamped wave, with
+    "together" of the fast one. The amplitude is so small that no pressure becomes negative near the free surface.
+    """
+    scene, mesh = column(cells, HEIGHT, conductivity, bulk_modulus, YOUNG, drainage=drainage, **numerics)
+    solver = Solver(scene, mesh, threads=1)
+    speeds, shapes = modes(bulk_modulus)
+    shape = np.ones(2) if mode == "together" else shapes[1 if mode == "fast" else 0]
+    amplitude = 1e-5 * shape / np.abs(shape).max()
+    kappa = math.pi / (2 * HEIGHT)
+    wave = np.sin(kappa * (solver.points[:, Y] + HEIGHT))
+    solver.points[:, VSY], solver.points[:, VLY] = amplitude[0] * wave, amplitude[1] * wave
+    end = periods * 2 * math.pi / kappa / speeds[0 if mode == "slow" else 1]
+    times, measured = [], []
+    with Stopwatch() as watch:
+        while solver.time < end * (1 - 1e-12):
+            dt, _ = solver.step(end - solver.time)
+            wave = np.sin(kappa * (solver.points[:, Y] + HEIGHT))
+            times.append(solver.time - 0.5 * dt)  # velocities belong to the middle of a step
+            measured.append(
+                [wave @ solver.points[:, VSY] / (wave @ wave), wave @ solver.points[:, VLY] / (wave @ wave)]
+            )
+    exact = exact_velocities(amplitude, kappa, times, bulk_modulus, conductivity)
+    miss = (np.array(measured) - exact) / np.abs(amplitude).max()
+    values = {"largest": float(np.abs(miss).max()), "wave_speed_error": math.nan}
+    crossings = [zero_crossings(times, np.asarray(a)[:, 0]) for a in (measured, exact)]
+    if min(len(c) for c in crossings) >= 3:
+        spans = [c[2] - c[0] for c in crossings]
+        values["wave_speed_error"] = spans[1] / spans[0] - 1
+    return Result(
+        error=float(np.sqrt(np.mean(miss**2))), values=values, steps=solver.step_count, points=solver.n_points,
+        cpu_seconds=watch.seconds,
+    )  # fmt: skip
+
+
+def zero_crossings(times, values):
+    """Times at which a sampled signal changes its sign, linear between the samples."""
+    times, values = np.asarray(times), np.asarray(values)
+    k = np.flatnonzero(values[:-1] * values[1:] < 0)
+    return times[k] - values[k] * (times[k + 1] - times[k]) / (values[k + 1] - values[k])
+
+
+def bar(cells=20, periods=5.0, **numerics):
+    """A bar without lateral strain, fixed at one end, swings in its lowest mode: velocity and energy.
+
+    Reference: omega = pi c / (2 L), c^2 = E / rho, of Kelvin and Voigt's body whose time is `stress_damping` steps:
+    v'' + omega^2 tau v' + omega^2 v = 0. Without it the sum of kinetic and strain energy is constant.
+    """
+    size, length = 1.0 / cells, 1.0
+    soil = {"model": "elastic", "poissons_ratio": 0.0}
+    scene = box_scene("bar", size, 2 * size, length, soil, gravity=1e-9, **numerics)
+    solver = Solver(scene, box_mesh([-size, 0.0, size], np.linspace(-1, 0, cells + 1)), threads=1)
+    solver.points[:, [SXX, SYY, SZZ, P]] = 0.0
+    soil = scene.soils[0]
+    speed = math.sqrt(soil.youngs_modulus / ((1 - soil.porosity) * soil.grain_density))
+    omega, amplitude = math.pi * speed / (2 * length), 1e-4 * speed
+    shape = np.sin(math.pi / 2 * (solver.points[:, Y] + length))
+    solver.points[:, VSY] = amplitude * shape
+    begin = kinetic_energy(solver) + strain_energy(solver)
+    end, times, swing, energy = periods * 2 * math.pi / omega, [], [], []
+    with Stopwatch() as watch:
+        while solver.time < end * (1 - 1e-12):
+            before = strain_energy(solver)
+            dt, _ = solver.step(end - solver.time)
+            shape = np.sin(math.pi / 2 * (solver.points[:, Y] + length))
+            times.append(solver.time - 0.5 * dt)
+            swing.append(shape @ solver.points[:, VSY] / (shape @ shape) / amplitude)
+            energy.append((kinetic_energy(solver) + 0.5 * (before + strain_energy(solver))) / begin - 1)
+    times = np.array(times)
+    decay = 0.5 * omega**2 * scene.numerics.stress_damping * end / solver.step_count
+    turn = math.sqrt(omega**2 - decay**2)
+    exact = np.exp(-decay * times) * (np.cos(turn * times) - decay / turn * np.sin(turn * times))
+    miss = np.array(swing) - exact
+    crossings = zero_crossings(times, swing)
+    exact = (np.arange(len(crossings)) + 0.5) * math.pi / omega
+    return Result(
+        error=float(np.sqrt(np.mean(miss**2))),
+        values={
+            "energy": float(np.abs(energy).max()), "energy_at_the_end": float(np.mean(energy[-20:])),
+            "wave_speed_error": float(exact[-1] / crossings[-1] - 1), "decay": decay * end,
+        },
+        steps=solver.step_count, points=solver.n_points, cpu_seconds=watch.seconds,
+    )  # fmt: skip
+
+
+# The slow wave has stiff water: its own weight compresses soft water by 0.1 %, which linear waves do not know.
+#: Without what damps: what is measured is the wave. `damped-bar` measures the damping.
+FREE = {"stress_damping": 0.0, "pic_rate": 0.0}
+LADDER = {"cells": (5, 10, 20, 40), **NUMERICS, **WET, "bulk_modulus": (8e7, 2.2e9)}
+TOO_SLOW = "phase after two periods: 20 linear elements a quarter wave are 0.2 % too slow"
+NORM = "root mean square, over phases and time, of the amplitude's error over the initial amplitude"
+SOURCE = "matrix exponential of the two-phase equations of a standing wave (Xie et al., Eqs. 1 and 2)"
+
+register(Problem(
+    name="bar", title="free vibration of an elastic bar", source="omega = pi c / (2 L), c^2 = E / rho",
+    norm="root mean square over five periods of the amplitude's error", solve=bar, fast={"cells": 20, **FREE},
+    ladder={"cells": (5, 10, 20, 40), "periods": (2.0, 5.0, 20.0), **NUMERICS},
+    limit=0.02, why="the phase after five periods: linear elements of a twentieth of the bar are 0.1 % too slow",
+))  # fmt: skip
+
+register(Problem(
+    name="damped-bar", title="free vibration of a bar that the damping of the stress slows down",
+    source="Kelvin and Voigt: v'' + omega^2 tau v' + omega^2 v = 0, tau the share `stress_damping` of the step",
+    norm="root mean square over five periods of the amplitude's error", solve=bar, fast={"cells": 20},
+    ladder={"cells": (5, 10, 20, 40), "stress_damping": (0.0, 0.5, 1.0), "courant": (0.4, 0.8, 1.0)},
+    limit=0.01, why="as without damping, with 15 % of the amplitude gone after five periods",
+))  # fmt: skip
+
+for name, title, fast, limit, why in (
+    ("undrained-wave", "grains and water move together where the permeability is small",
+     {"conductivity": 1e-9, "mode": "together"}, 0.015, TOO_SLOW),
+    ("fast-wave", "fast wave, grains and water in phase, almost without drag",
+     {"conductivity": 1.0, "mode": "fast"}, 0.015, TOO_SLOW),
+    ("slow-wave", "slow wave, grains against water, almost without drag",
+     {"conductivity": 10.0, "mode": "slow", "bulk_modulus": 2.2e9}, 0.015, TOO_SLOW),
+    ("damped-wave", "both waves together, damped by drag",
+     {"conductivity": 2e-2, "mode": "together"}, 0.015, TOO_SLOW),
+):  # fmt: skip
+    register(Problem(
+        name=name, title=title, source=SOURCE, norm=NORM, solve=two_phase_wave, fast={"cells": 20, **FREE, **fast},
+        ladder=LADDER | ({"drainage": DRAINAGE} if name == "undrained-wave" else {}), limit=limit, why=why,
+    ))  # fmt: skip

@@ -1,0 +1,137 @@
+"""All measurements of `gush bench`, in one process and some children, one after the other."""
+
+import os
+import time as clock
+
+from verification.speed import processes
+from verification.speed.layout import bytes_per_point_step, operations_per_point_step
+from verification.speed.reference import ReferenceLoop, copy_bandwidth
+from verification.speed.sizes import LARGEST, SIZES, size_ladder, slope
+from verification.speed.stepping import SECONDS_OF_WARM_UP, configurations, kernel_times, prepared, rate, timed
+
+ROUNDS, SECONDS = 3, 1.0
+FEW_SECONDS = 0.3
+
+
+def bench(scene, step_only=False, large=False, tell=lambda line: None, rounds=ROUNDS, seconds=SECONDS):
+    """Measure what steps, sizes, starts and parallel runs cost.
+
+    Parameters
+    ----------
+    scene : coupling.Scene
+        Gate open, from the geostatic state.
+    step_only : bool
+        Only the step of the whole scene beside the reference loop and the copy.
+    large : bool
+        Also three million points.
+    tell : callable
+        Called with a line of text now and then.
+    rounds, seconds : int, float
+        The best of some rounds counts, each of so much processor time: other programs only ever slow one down.
+
+    Returns
+    -------
+    dict
+        step_points_per_second, reference_points_per_second: point-steps per second of processor time, one thread;
+        step_to_reference_ratio; scene, points, elements, step_rounds, reference_rounds: all measurements;
+        copy_bytes_per_second; bytes_per_point: memory of the solver; bytes_per_point_step, operations_per_point_step:
+        counted; roofline_points_per_second: copy over bytes; kernels: name to processor seconds per point-step; load:
+        mean number of running programs before and after. Unless `step_only` also configurations, threads, sizes,
+        size_slope, imports [s], start [s], first_step_wall_seconds, throughput.
+    """
+    import mpm
+
+    load = [os.getloadavg()[0]]
+    mesh = mpm.build_mesh(scene.mpm)
+    solver = prepared(scene.mpm, mesh)
+    data = {"scene": scene.name, **_beside_reference(solver, rounds, seconds)}
+    data["elements"] = len(mesh.elements)
+    data["bytes_per_point"] = solver.memory_bytes() / solver.n_points
+    data["bytes_per_point_step"] = bytes_per_point_step(solver)
+    data["operations_per_point_step"] = operations_per_point_step(solver)
+    data["roofline_points_per_second"] = data["copy_bytes_per_second"] / sum(data["bytes_per_point_step"].values())
+    data["kernels"] = kernel_times(solver, seconds)
+    del solver
+    if not step_only:
+        tell("what a scene has and has not")
+        data["configurations"] = _configurations(scene.mpm, mesh, seconds)
+        data["threads"] = _threads(scene.mpm, mesh, rounds, seconds)
+        tell("sizes")
+        data["sizes"] = size_ladder(scene.mpm, [*SIZES, LARGEST] if large else SIZES, FEW_SECONDS)
+        data["size_slope"] = slope(data["sizes"])
+        tell("starts")
+        data["imports"] = processes.import_seconds()
+        data["start"] = processes.start_seconds()
+        data["first_step_wall_seconds"] = processes.first_step_wall_seconds()
+        tell("runs at once")
+        data["throughput"] = _throughput()
+    data["load"] = [*load, os.getloadavg()[0]]
+    data["cpu_seconds"] = sum(os.times()[:4])
+    return data
+
+
+def _beside_reference(solver, rounds, seconds):
+    reference = ReferenceLoop(solver.n_points)
+    reference.step()
+    timed(reference.step, SECONDS_OF_WARM_UP)
+    step_rounds, reference_rounds = [], []
+    for _ in range(rounds):  # in turns: what slows the machine down slows both
+        step_rounds.append(rate(solver, seconds)[0])
+        count, used, _ = timed(reference.step, seconds)
+        reference_rounds.append(count * solver.n_points / used)
+    return {
+        "points": int(solver.n_points),
+        "step_points_per_second": max(step_rounds),
+        "reference_points_per_second": max(reference_rounds),
+        "step_to_reference_ratio": max(step_rounds) / max(reference_rounds),
+        "step_rounds": step_rounds,
+        "reference_rounds": reference_rounds,
+        "copy_bytes_per_second": copy_bandwidth(),
+    }
+
+
+def _configurations(mpm_scene, mesh, seconds):
+    rows = []
+    for name, scene in configurations(mpm_scene):
+        solver = prepared(scene, mesh)
+        per_second, _, simulated = max(rate(solver, 0.5 * seconds) for _ in range(2))
+        rows.append(
+            {
+                "configuration": name,
+                "points_per_second": per_second,
+                "simulated_per_cpu_second": simulated,
+                "bytes_per_point": solver.memory_bytes() / solver.n_points,
+            }
+        )
+    return rows
+
+
+def _threads(mpm_scene, mesh, rounds, seconds):
+    solvers = [prepared(mpm_scene, mesh, threads) for threads in (1, None)]
+    best = [(0.0, 0.0) for _ in solvers]
+    for _ in range(rounds):  # in turns, as above
+        for k, solver in enumerate(solvers):
+            per_second, per_wall, _ = rate(solver, seconds)
+            best[k] = max(best[k], (per_wall, per_second))
+    rows = [
+        {"threads": solver.threads, "points_per_second": per_second, "points_per_wall_second": per_wall}
+        for solver, (per_wall, per_second) in zip(solvers, best, strict=True)
+    ]
+    rows[-1]["speed_up"] = rows[-1]["points_per_wall_second"] / rows[0]["points_per_wall_second"]
+    return rows
+
+
+def _throughput():
+    count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+    begin = clock.perf_counter()
+    one, alone = processes.throughput(1)
+    many, shared = processes.throughput(count)
+    return {
+        "runs": count,
+        "one_points_per_wall_second": one,
+        "all_points_per_wall_second": many,
+        "share_of_ideal": many / (count * one),
+        "processor_share_of_one": alone,
+        "processor_share_of_each": shared,
+        "seconds": clock.perf_counter() - begin,
+    }
