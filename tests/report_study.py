@@ -4,13 +4,12 @@ import sys
 from dataclasses import replace
 
 import numpy as np
-from report_run import TIMES, moving_record
-from test_figures import TwoTriangles
 
 import coupling
 from coupling import datasets
 from coupling.provenance import root_attributes
 from mpm.solver import RunFailed
+from verification.synthetic_run import TIMES, TwoTriangles, moving_record
 
 REASON = "no initial equilibrium <b>at all</b>; make the elements smaller"
 

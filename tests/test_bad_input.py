@@ -5,18 +5,18 @@ import random
 import h5py
 import numpy as np
 import pytest
-import wild_scenes
-from damaged_files import READERS, damaged, judged
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from report_run import write_run
-from small_event import small_scene
 
 import coupling
 from coupling import SceneError, checkpoint, datasets
 from coupling.plan import plan, rough_plan
 from coupling.plausibility import warnings_of
 from coupling.scene_lines import line_of
+from verification.robustness import wild_scenes
+from verification.robustness.damaged_files import READERS, damaged, judged
+from verification.small_event import small_scene
+from verification.synthetic_run import write_run
 
 FEW = settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 GOOD = small_scene().source

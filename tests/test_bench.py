@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from small_event import small_scene
 
 import mpm
+from verification.small_event import small_scene
 from verification.speed import layout, processes
 from verification.speed.command import bench
 from verification.speed.sizes import slope

@@ -8,13 +8,12 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
-from report_run import write_run
-from synthetic_run import make_quick_scene
 
 import coupling
 from coupling import compare, datasets
 from coupling.pressure_source import read_source
 from coupling.provenance import PACKAGES
+from verification.synthetic_run import make_quick_scene, write_run
 
 GROUPS = ("lining", "history", "points", "mesh", "structure/beam_spring", "structure/continuum")
 #: Elapsed time in plain "s" is right for a duration; CF's rules for time coordinates know calendar times only.

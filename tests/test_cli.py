@@ -9,7 +9,6 @@ import time
 from types import SimpleNamespace
 
 import pytest
-from synthetic_run import make_quick_scene, record
 from typer.testing import CliRunner
 
 import coupling
@@ -21,6 +20,7 @@ from coupling.plan import features
 from coupling.progress_line import ProgressLine
 from coupling.run import check_memory, run
 from coupling.run_folder import RunRefused, claimed, default_folder
+from verification.synthetic_run import make_quick_scene, record
 
 HEAVY = ("numba", "xarray", "matplotlib", "pint", "scipy", "skfem", "gmsh", "numpy")
 
@@ -29,7 +29,7 @@ class Bare:
     """A mesh for runs that are not simulated."""
 
     def __init__(self):
-        from test_figures import TwoTriangles
+        from verification.synthetic_run import TwoTriangles
 
         self.nodes, self.elements, self.region = TwoTriangles.nodes, TwoTriangles.elements, TwoTriangles.region
         self.quality = {"n_elements": 2}

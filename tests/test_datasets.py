@@ -6,11 +6,11 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
-from synthetic_run import lining, make_quick_scene, record
 
 import coupling
 from coupling import datasets
 from coupling.provenance import root_attributes
+from verification.synthetic_run import lining, make_quick_scene, record
 
 
 def write(path, times, status="finished", scene=None, **options):
@@ -135,7 +135,7 @@ def test_killed_writer_leaves_a_readable_file(tmp_path):
     code = f"""
 import os, sys
 sys.path.insert(0, {str(__file__.rpartition("/")[0])!r})
-from synthetic_run import make_quick_scene, record
+from verification.synthetic_run import make_quick_scene, record
 import coupling
 from coupling import datasets
 from coupling.provenance import root_attributes

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from small_event import small_scene
 
 import mpm
 from mpm.long_step import ADVANCE, FOLLOW, PLAN, REMAP, SOLVE, UPDATE
 from mpm.variables import MASS, S_RHO_S, V_DLX, V_DLY, V_DSX, V_DSY, VLX, VLY, N, X, Y
+from verification.small_event import small_scene
 
 
 class Audited(mpm.Solver):

@@ -79,14 +79,14 @@ def test_impossible_efficiency_is_refused(example, ring, efficiency):
 
 
 def test_figures_of_the_ring_are_drawn_by_their_script(tmp_path):
-    script = ROOT / "docs" / "draw_ring_figures.py"
-    subprocess.run([sys.executable, "-W", "error", script, tmp_path], cwd=ROOT, check=True)
+    command = [sys.executable, "-W", "error", "-m", "verification.pictures.ring", tmp_path]
+    subprocess.run(command, cwd=ROOT, check=True)
     assert {path.name for path in tmp_path.iterdir()} == {"joint_laws.png", "ring_checks.png"}
 
 
 def test_cost_of_the_ring_is_measured_and_small():
     result = subprocess.run(
-        [sys.executable, "-W", "error", ROOT / "benchmarks" / "ring.py", "100"],
+        [sys.executable, "-W", "error", "-m", "verification.reports.ring", "100"],
         capture_output=True,
         text=True,
         cwd=ROOT,

@@ -6,8 +6,6 @@ import xml.etree.ElementTree as ET
 import meshio
 import numpy as np
 import pytest
-from synthetic_run import make_quick_scene, record
-from test_figures import TwoTriangles
 from typer.testing import CliRunner
 
 from coupling import datasets
@@ -18,6 +16,7 @@ from coupling.provenance import root_attributes
 from coupling.report.page import write_report
 from coupling.run import respond
 from coupling.run_folder import claimed
+from verification.synthetic_run import TwoTriangles, make_quick_scene, record
 
 TIMES = (0.0, 0.5, 1.0)
 STEMS = ("points", "mesh", "lining", "ring_beam_spring")

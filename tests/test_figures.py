@@ -6,11 +6,11 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
-from synthetic_run import make_quick_scene, record
 
 from coupling import datasets, figures
 from coupling.provenance import root_attributes
 from coupling.run import respond
+from verification.synthetic_run import TwoTriangles, make_quick_scene, record
 
 
 @pytest.fixture(scope="module")
@@ -24,14 +24,6 @@ def run(tmp_path_factory):
     writer.close("finished")
     datasets.write_response(path, respond(scene, datasets.read_pressures(path)))
     return path
-
-
-class TwoTriangles:
-    """The least that a mesh must have to be stored."""
-
-    nodes = np.array([[3.0, -23.0], [4.0, -23.0], [4.0, -24.0], [3.0, -24.0]])
-    elements = np.array([[0, 2, 1], [0, 3, 2]])
-    region = np.array([0, 1])
 
 
 def line(axis, label):

@@ -1,11 +1,11 @@
 """Ground and lining without a gate: nothing opens, nothing flows, and every command takes the run as any other."""
 
 import pytest
-from small_event import COARSE
 from typer.testing import CliRunner
 
 import coupling
 from coupling import cli
+from verification.small_event import COARSE
 
 GATELESS = {
     "gate": "none", "discretisation": COARSE, "stop": {"time": 0.02, "inflow_mass": 1e9}, "output": {"interval": 0.01},

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from scipy.special import erfc
-from small_event import COARSE
 
 import coupling
 import mpm
 from mpm.points import initial_stress
 from mpm.variables import SXX, SXY, VLY, VSX, X0, Y0, P, Y
+from verification.small_event import COARSE
 from verification.stability.amplification import Column
 
 

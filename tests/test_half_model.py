@@ -4,13 +4,13 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from small_event import COARSE, small_scene
 
 import coupling
 import mpm
 from mpm.half_model import right_half, with_mirror_image
 from mpm.mesh import Mesh, areas
 from mpm.variables import SYY, VSX, P
+from verification.small_event import COARSE, small_scene
 
 # Sums at the nodes are the same up to their order; the event multiplies their last bits by some 1e3 in a hundred steps.
 ROUND_OFF = 1e-11

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import xarray as xr
 from test_cli import gush
-from wild_pressures import judged, wild_pressures
 
 import coupling
 import structure
 from coupling.datasets import RunFileError
 from coupling.pressure_source import read_source
 from structure.pressures import WIDEST_GAP, check_pressures
+from verification.robustness.wild_pressures import judged, wild_pressures
 
 RING = coupling.load_scene("case-3").ring
 

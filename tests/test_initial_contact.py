@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from small_event import small_scene
 
 import coupling
 import mpm
 from coupling.plan import features
 from coupling.recorded_simulation import MOST_UNBORNE
 from coupling.scene import scene_names
+from verification.small_event import small_scene
 
 QUICK = coupling.load_scene("quick").mpm
 

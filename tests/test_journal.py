@@ -3,10 +3,10 @@
 import h5py
 import numpy as np
 import pytest
-from synthetic_run import make_quick_scene, record
 
 from coupling import datasets, journal
 from coupling.provenance import root_attributes
+from verification.synthetic_run import make_quick_scene, record
 
 
 class Cut(Exception):

@@ -29,7 +29,7 @@ import hashlib, inspect
 import mpm
 import mpm.contact, mpm.meeting, mpm.points, mpm.spectrum, mpm.stages
 import sys; sys.path.insert(0, "tests")
-from small_event import small_scene
+from verification.small_event import small_scene
 scene = small_scene().mpm
 solver = mpm.Solver(scene, mpm.build_mesh(scene), threads=1)
 solver.relax()

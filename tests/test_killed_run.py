@@ -5,12 +5,12 @@ import subprocess
 import sys
 import time as clock
 
-from small_event import small_scene
 from typer.testing import CliRunner
 
 from coupling import cli
 from coupling.datasets import RunFileError, read_attributes, read_history
 from coupling.info import describe
+from verification.small_event import small_scene
 
 
 def test_killed_run_is_interrupted_and_offers_to_resume(tmp_path):

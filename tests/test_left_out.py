@@ -3,7 +3,6 @@
 import numba
 import numpy as np
 import pytest
-from small_event import small_scene
 
 import coupling
 import coupling.datasets
@@ -42,6 +41,7 @@ from mpm.variables import (
     X,
     Y,
 )  # fmt: skip
+from verification.small_event import small_scene
 
 MOTION = [X, Y, VSX, VSY, EQ]
 STRESS = [SXX, SYY, SZZ, SXY]

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from synthetic_run import make_quick_scene
 from test_cli import gush, simulated  # noqa: F401
 from test_continuum_lining import pressures, ring
 
@@ -15,6 +14,7 @@ import structure
 from coupling.datasets import read_response
 from coupling.run import run
 from structure import models
+from verification.synthetic_run import make_quick_scene
 
 DOCUMENT = Path(__file__).parent.parent / "docs" / "lining-models.md"
 

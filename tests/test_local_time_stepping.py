@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from small_event import COARSE
 
 import coupling
 import mpm
 from mpm.variables import MASS, S_RHO_S, VLX, VLY, VSX, VSY, N, X, Y
 from verification.problems.boxes import box_mesh
 from verification.problems.driven import box_scene
+from verification.small_event import COARSE
 from verification.stability.monitor import kinetic_energy
 
 GRADED = {**COARSE, "size_growth": 0.3}

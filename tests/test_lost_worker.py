@@ -10,7 +10,7 @@ ROOT = Path(__file__).parent.parent
 
 def test_study_with_a_killed_worker_equals_the_serial_one():
     result = subprocess.run(
-        [sys.executable, ROOT / "benchmarks" / "lost_worker.py", "4", "--print-only"],
+        [sys.executable, "-m", "verification.robustness.lost_worker", "4", "--print-only"],
         capture_output=True,
         text=True,
         cwd=ROOT,

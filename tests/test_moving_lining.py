@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from small_event import small_scene
 
 import coupling
 import mpm
@@ -14,6 +13,7 @@ from mpm.lining import ElasticRing, RigidRing
 from mpm.variables import SXX, SXY, SYY, SZZ, V_SX, V_SY, VSX
 from mpm.wall import NODE_STATE, reaction_kernel
 from structure import theory
+from verification.small_event import small_scene
 
 MODULUS, NU, DENSITY = 34.5e9, 0.2, 2548.0
 THETA = np.radians(np.arange(0.0, 360.0, 3.0))

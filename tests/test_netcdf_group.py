@@ -5,10 +5,10 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from report_run import write_run
 
 import coupling
 from coupling.netcdf_group import read_group_at_once
+from verification.synthetic_run import write_run
 
 
 @pytest.fixture(scope="module")

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import matplotlib.figure
 import pytest
-from small_event import small_scene
 
 import coupling
 import structure
 from coupling.figures import inflow
+from verification.small_event import small_scene
 
 NOTEBOOK = Path(__file__).parent.parent / "examples" / "notebook_run.ipynb"
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import xarray as xr
-from report_run import write_run
 from report_study import write_study
 
 import coupling
@@ -12,6 +11,7 @@ from coupling.report.page import write_report
 from coupling.run import respond_by_name
 from structure import BeamSpringLining, ContinuumLining, theory
 from structure.lining import THETA, at_whole_degrees
+from verification.synthetic_run import write_run
 
 LOADS = theory.theoretical_pressures(
     outer_diameter=6.6, cover=20.0, buoyant_unit_weight=8900.0, coefficient_at_rest=3 / 7

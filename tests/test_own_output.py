@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
-from report_run import write_run
 from test_cli import gush
 from test_lining_models import LIMITS, written  # noqa: F401
 
 from coupling.datasets import read_response
+from verification.synthetic_run import write_run
 
 
 @pytest.fixture

@@ -1,12 +1,12 @@
 """What `plan` foretells is what a run then does."""
 
 import pytest
-from small_event import COARSE, small_scene
 
 import coupling
 import mpm.solver
 from coupling.datasets import read_history
 from coupling.plan import plan, rough_plan
+from verification.small_event import COARSE, small_scene
 
 
 @pytest.mark.parametrize("intervals", [1, 4, 10])

@@ -4,10 +4,10 @@ import re
 from pathlib import Path
 
 import pytest
-from small_event import small_scene
 
 import coupling
 from coupling.run import respond
+from verification.small_event import small_scene
 
 PAGE = (Path(__file__).parent.parent / "docs" / "postprocessing.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```python\n(.*?)```", PAGE, re.S)

@@ -5,7 +5,6 @@ import re
 import numpy as np
 import pytest
 import xarray as xr
-from small_event import COARSE
 from test_cli import gush
 
 import coupling
@@ -17,6 +16,7 @@ from verification.published.page import write_page
 from verification.published.run_all import plans
 from verification.published.sensitivity_figure import changes, sensitivity_figure
 from verification.published.sources import at_study_inflow, published_numbers
+from verification.small_event import COARSE
 
 FIXED = {f"discretisation.{name}": value for name, value in COARSE.items()} | {
     "numerics.relaxation_tolerance": 1e-3,

@@ -4,8 +4,6 @@ import re
 
 import numpy as np
 import pytest
-from small_event import small_scene
-from synthetic_run import make_quick_scene
 from test_cli import simulated  # noqa: F401
 from test_gushing import event, quick  # noqa: F401
 from test_heap import dropped_block
@@ -18,6 +16,8 @@ from mpm import simulate
 from mpm.errors import COMPARED, errors, largest_so_far
 from mpm.scene import Numerics, Stop
 from mpm.variables import MASS, Y0
+from verification.small_event import small_scene
+from verification.synthetic_run import make_quick_scene
 
 
 def test_fall_turns_the_work_of_gravity_into_motion():

@@ -5,8 +5,6 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
-from report_run import TIMES, write_run
-from synthetic_run import points
 from typer.testing import CliRunner
 
 import coupling
@@ -14,6 +12,7 @@ from coupling import datasets
 from coupling.cli import app
 from coupling.report import fields, numbers, page, run_page, series
 from coupling.report.packing import evenly, unpacked
+from verification.synthetic_run import TIMES, points, write_run
 
 
 @pytest.fixture(scope="module")

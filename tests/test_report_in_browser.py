@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from browser import find_browser
 from page_in_browser import CONTRAST, choose, number, show_frame, spoken, wider_than_the_screen, written_as
-from report_run import write_run
-from synthetic_run import record
 
 import coupling
 from coupling import datasets
 from coupling.provenance import root_attributes
 from coupling.report import page, series
+from verification.synthetic_run import record, write_run
 
 pytestmark = pytest.mark.skipif(
     find_browser() is None, reason="no Chromium on this machine; Debian: apt-get install chromium-headless-shell"

@@ -13,7 +13,6 @@ import warnings
 import h5py
 import numpy as np
 import pytest
-from small_event import small_scene
 from typer.testing import CliRunner
 
 import coupling
@@ -21,6 +20,7 @@ from coupling import checkpoint, datasets, provenance
 from coupling.cli import app
 from coupling.rerun import compare_bits
 from coupling.run_folder import RunRefused
+from verification.small_event import small_scene
 
 OFTEN = {"checkpoint_interval": 0.0}  # the time that checkpoints may take is limited too: some ten of them
 KILLED = 9

@@ -4,11 +4,11 @@ import itertools
 
 import numpy as np
 import pytest
-from small_event import small_scene
 
 import mpm
 import mpm.solver
 from mpm.state import ARRAYS, NUMBERS
+from verification.small_event import small_scene
 
 #: Attributes of a solver that its state leaves out: built from scene and mesh, or by sorting the points.
 BUILT = {

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from small_event import small_scene
 
 import mpm
+from verification.small_event import small_scene
 
 
 def steps_of(scene):

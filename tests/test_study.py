@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from small_event import small_scene
 from test_cli import gush
 
 import coupling
@@ -22,6 +21,7 @@ from coupling.studies.design import Study, StudyError, cases, load_study, study_
 from coupling.studies.pool import Pool
 from coupling.studies.progress import CaseProgress, study_state
 from coupling.studies.sensitivity import scatter, sensitivity, tornado
+from verification.small_event import small_scene
 
 TINY = {
     "name": "tiny",
@@ -192,8 +192,8 @@ def test_lost_workers_cost_only_their_case(tmp_path, monkeypatch):
 def test_script_without_a_guard_runs_its_study_in_processes_and_in_silence(tmp_path):
     script = tmp_path / "mine.py"
     script.write_text(
-        f"import sys\nsys.path.insert(0, {str(Path(__file__).parent)!r})\n"
-        "import coupling\nfrom small_event import COARSE\n"
+        f"import sys\nsys.path.insert(0, {str(Path(__file__).parent.parent)!r})\n"
+        "import coupling\nfrom verification.small_event import COARSE\n"
         "fixed = {f'discretisation.{name}': value for name, value in COARSE.items()}\n"
         "fixed |= {'numerics.relaxation_tolerance': 1e-3, 'stop.time': 0.01, 'stop.inflow_mass': 1.0}\n"
         "study = coupling.study({'name': 's', 'records': 2, 'fixed': fixed | {'output.interval': 0.005},\n"

@@ -6,7 +6,6 @@ import shutil
 
 import numpy as np
 import pytest
-from small_event import COARSE
 from test_cli import gush
 
 import coupling
@@ -17,6 +16,7 @@ from coupling.report.page import write_report
 from coupling.run import respond, respond_by_name
 from coupling.scene import ring_of
 from coupling.summary import summarise_run
+from verification.small_event import COARSE
 
 GATE = 1
 

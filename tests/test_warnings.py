@@ -3,13 +3,13 @@
 import warnings
 
 import pytest
-from small_event import small_scene
 from typer.testing import CliRunner
 
 import coupling
 import structure
 from coupling import GushingWarning, cli
 from coupling.plan import plan, rough_plan
+from verification.small_event import small_scene
 
 UNUSUAL = {"ring": {"ground": {"youngs_modulus": 35.0, "friction_angle": 0.5}}}
 EXPECTED = (

@@ -3,12 +3,12 @@
 import re
 
 import pytest
-from report_run import write_run
 from typer.testing import CliRunner
 
 from coupling.cli import app
 from coupling.report import numbers, run_markup, run_page
 from coupling.report.page import write_report
+from verification.synthetic_run import write_run
 
 
 @pytest.fixture(scope="module")

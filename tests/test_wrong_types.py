@@ -1,7 +1,6 @@
 """Wrong types, and what got past the checks, are answered with rule, name, value and remedy, never with a trace."""
 
 import pytest
-from small_event import small_scene
 from typer.testing import CliRunner
 
 import coupling
@@ -9,6 +8,7 @@ import structure
 from coupling import cli
 from coupling.plan import rough_plan
 from coupling.run_folder import RunRefused
+from verification.small_event import small_scene
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ def test_mistake_in_a_file_of_limits_is_told_alike_in_python_and_on_the_command_
     with pytest.raises(structure.InputError) as caught:
         structure.Limits.from_toml(file)
     assert message in str(caught.value) and "pydantic" not in str(caught.value) and "limits.toml" in str(caught.value)
-    from report_run import write_run
+    from verification.synthetic_run import write_run
 
     write_run(tmp_path / "run")
     result = CliRunner().invoke(cli.app, ["respond", str(tmp_path / "run"), "--limits", str(file)])

@@ -7,11 +7,11 @@ import h5netcdf
 import numpy as np
 import pytest
 import xarray as xr
-from report_run import TIMES, write_run
 
 import coupling
 from coupling import datasets
 from coupling.postprocess import at_inflow, by_inflow
+from verification.synthetic_run import TIMES, write_run
 
 GROUPS = ("lining", "history", "points", "mesh", "structure/beam_spring", "structure/continuum")
 

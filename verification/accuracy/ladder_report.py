@@ -7,7 +7,7 @@ from pathlib import Path
 
 from coupling.provenance import revision
 from verification.accuracy import figures
-from verification.accuracy.report import origin
+from verification.pages import made_by
 
 
 def write_ladder(ladder, name: str, runs: list[dict], folder: Path) -> dict:
@@ -23,7 +23,7 @@ def write_ladder(ladder, name: str, runs: list[dict], folder: Path) -> dict:
     page = [
         f"# How far {name} is from a fine mesh",
         "",
-        f"Made by `gush accuracy --scene {name}` {origin()}. Every mesh length is multiplied by a factor; states are",
+        f"{made_by(f'gush accuracy --scene {name}')}. Every mesh length is multiplied by a factor; states are",
         "compared at equal inflow mass. Meshes of nearly one size show what the arrangement of elements alone does.",
         "Value at size zero: straight line in mesh size, least squares (stresses of linear triangles: first order).",
         "Error bar: the larger of its distance from the finest mesh and twice the standard error of the fit. Pressures",

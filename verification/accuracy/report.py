@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import os
-import platform
 from datetime import UTC, datetime
 from pathlib import Path
 
 from coupling.provenance import revision
 from verification.accuracy import figures
 from verification.accuracy.ladders import assess, dataset
+from verification.pages import made_by
 
 READING = """
 ## What it says
@@ -69,7 +68,7 @@ def write(rows: list[dict], problems: dict, folder: Path) -> dict:
     page = [
         "# Error against run time",
         "",
-        f"Made by `gush accuracy` {origin()}.",
+        f"{made_by('gush accuracy')}.",
         "Errors are in the norm of each problem, times are processor time of stepping, one thread, without compiling.",
         "",
         "![overview](images/accuracy-overview.png)",
@@ -96,14 +95,6 @@ def write(rows: list[dict], problems: dict, folder: Path) -> dict:
     data.attrs = {"title": "error against run time", "revision": revision(), "created": f"{datetime.now(UTC):%Y-%m-%d}"}
     data.to_netcdf(folder / "accuracy.nc", engine="h5netcdf")
     return {"page": str(folder / "accuracy.md"), "data": str(folder / "accuracy.nc"), "problems": summary}
-
-
-def origin() -> str:
-    """When, with which revision and on which machine a page is made, as half a sentence."""
-    return (
-        f"on {datetime.now(UTC):%Y-%m-%d}: revision {revision() or 'unknown'}, {os.cpu_count()} cores,"
-        f" {platform.machine()}, Python {platform.python_version()}"
-    )
 
 
 def _summary(rows, problem):

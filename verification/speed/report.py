@@ -1,14 +1,11 @@
 """Table, dataset, figure and page of `gush bench`."""
 
 import json
-import os
-import platform
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 
-from coupling.provenance import revision
+from verification.pages import made_by, provenance
 
 
 def dataset(data):
@@ -82,24 +79,6 @@ def figure(data):
     return drawn
 
 
-def provenance():
-    """Machine, date and revision."""
-    return {
-        "date": f"{datetime.now(UTC):%Y-%m-%d}",
-        "revision": revision(),
-        "machine": f"{os.cpu_count()} cores, {_processor()}, Python {platform.python_version()}",
-    }
-
-
-def _processor():
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
-    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.machine()
-
-
 def write(data, out):
     """Write performance.md, .json, .nc and images/performance.png into a folder; returns the paths."""
     out = Path(out)
@@ -114,14 +93,14 @@ def write(data, out):
 
 def page(data):
     """The page docs/performance.md as Markdown."""
-    made, reference = provenance(), data["reference_points_per_second"]
+    reference = data["reference_points_per_second"]
     counted, operations = data["bytes_per_point_step"], sum(data["operations_per_point_step"].values())
     copy, share = data["copy_bytes_per_second"], data["throughput"]
     start, imports = data["start"], data["imports"]
     lines = [
         "# Performance",
         "",
-        f"Made by `gush bench --out docs` on {made['date']}, revision {made['revision']}, {made['machine']}; mean "
+        f"{made_by('gush bench --out docs')}; mean "
         f"number of running programs {data['load'][0]:.1f} before, {data['load'][1]:.1f} after; "
         f"{data['cpu_seconds']:.0f} s of processor time. Scene {data['scene']}, {data['points']} points, "
         f"{data['elements']} elements. Rates are point-steps per second of processor time; the reference is a plain "

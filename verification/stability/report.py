@@ -1,14 +1,12 @@
 """Figure, dataset and page of `gush stability`."""
 
 import json
-import os
-import platform
 from dataclasses import asdict
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 
+from verification.pages import made_by, provenance
 from verification.stability.extremes import BUG, REFUSED, STABLE
 from verification.stability.linear import WAYS
 from verification.stability.text import EXTREMES, FOUND, LINEAR, READING
@@ -78,27 +76,14 @@ def families(linear):
     return rows
 
 
-def provenance():
-    """Machine, date and revision of a report."""
-    from coupling.provenance import root_attributes
-    from coupling.scene import load_scene
-
-    return {
-        "date": f"{datetime.now(UTC):%Y-%m-%d}",
-        "revision": root_attributes(load_scene("quick"))["revision"],
-        "machine": f"{os.cpu_count()} cores, {platform.machine()}, Python {platform.python_version()}",
-    }
-
-
 def page(linear, verdicts):
     """The report docs/stability.md as Markdown."""
-    made = provenance()
     counts = {name: sum(v.verdict == name for v in verdicts) for name in (STABLE, REFUSED, BUG)}
     seconds = sum(v.seconds for v in verdicts)
     lines = [
         "# Stability: critical time step and extremes",
         "",
-        f"Made by `gush stability --out docs` on {made['date']}, revision {made['revision']}, {made['machine']}.",
+        f"{made_by('gush stability --out docs')}.",
         "",
         *LINEAR.strip().splitlines(),
         "",

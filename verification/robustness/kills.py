@@ -1,6 +1,6 @@
 """Kill a small run at random moments, resume it, and compare with the uninterrupted run bit for bit.
 
-    uv run python benchmarks/kills.py [--kills 200] [--seed 0]
+    uv run python -m verification.robustness.kills [--kills 200] [--seed 0]
 
 Writes its part of docs/robustness.md and docs/robustness.json. Every run is the command `gush run` in a process of its
 own that ends by SIGKILL at a moment drawn evenly over the life of the uninterrupted one: meshing, relaxation, stepping,
@@ -20,8 +20,8 @@ import time
 from collections import Counter
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "benchmarks")]
+from verification.pages import need_docs
+
 KILLED_AGAIN = 0.25  # share of the resumed runs that are killed once more
 FINISHED = "finished"
 PEEK = os.WEXITED | os.WNOHANG | os.WNOWAIT  # look for the end of a process without taking its exit code
@@ -32,10 +32,11 @@ def main():
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
+    need_docs()
     with tempfile.TemporaryDirectory(prefix="gush-kills-") as place:
         result = kill_and_resume(Path(place), options.kills, random.Random(options.seed))
     result["seed"] = options.seed
-    from robustness_page import write_part
+    from verification.robustness.page import write_part
 
     write_part("kills", result)
     for name, value in result.items():
@@ -45,9 +46,8 @@ def main():
 
 def kill_and_resume(place, kills, draw):
     """Kill and resume until `kills` kills have struck a run at work."""
-    from small_event import small_scene
-
     from coupling.rerun import compare_bits
+    from verification.small_event import small_scene
 
     scene = place / "scene.toml"
     scene.write_text(small_scene(interior="sink", stop={"time": 0.08}).source, encoding="utf-8")

@@ -1,17 +1,13 @@
 """What a lining that floats or deforms in the soil computation changes, and what it costs: coarse case 3 to 100 kg/m.
 
-    uv run python benchmarks/lining_in_mpm.py    # some two minutes; writes docs/lining-in-mpm.md and .json
+    uv run python -m verification.reports.lining_in_mpm    # some two minutes; writes docs/lining-in-mpm.md and .json
 
 The prose of the page is here, its numbers are measured.
 """
 
 import json
-import os
-import platform
 import textwrap
 import time as clock
-from datetime import UTC, datetime
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -22,8 +18,8 @@ import structure
 from coupling.datasets import cell_centres, cell_mean_weights
 from coupling.provenance import root_attributes
 from structure import theory
+from verification.pages import DOCS, made_by, need_docs, provenance
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
 KINDS = ("fixed", "floating", "elastic")
 PRESSURES = ("soil_pressure", "water_pressure", "soil_shear")
 FORCES = ("axial_force", "shear_force", "bending_moment")
@@ -257,13 +253,13 @@ JOINTS = ("joint 1", "joint 2", "joint 3")
 HEAD = ("", "N max", "N min", "largest abs. Q", "M max", "M min", "M crown", "M invert")
 
 
-def page(data, machine):
+def page(data):
     """The report."""
     events = data["events"]
     lines = [
         "# The lining in the soil computation: held, floating, elastic",
         "",
-        f"Made by `uv run python benchmarks/lining_in_mpm.py` on {datetime.now(UTC):%Y-%m-%d}, {machine}. Case 3",
+        f"{made_by('uv run python -m verification.reports.lining_in_mpm')}. Case 3",
         "on the coarse mesh of `quick`, to 100 kg/m. Pressures in kPa, forces in kN and moments in kN m per metre.",
         "",
         *WHAT,
@@ -391,12 +387,12 @@ def answer(data):
 
 
 def main():
+    need_docs()
     data = measure()
-    machine = f"{os.cpu_count()} cores, {platform.machine()}, Python {platform.python_version()}"
-    attributes = root_attributes(coupling.load_scene("quick"))
+    attributes, machine = root_attributes(coupling.load_scene("quick")), provenance()["machine"]
     data["provenance"] = {k: str(attributes[k]) for k in ("revision", "versions", "created")} | {"machine": machine}
     (DOCS / "lining-in-mpm.json").write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
-    (DOCS / "lining-in-mpm.md").write_text(page(data, machine), encoding="utf-8")
+    (DOCS / "lining-in-mpm.md").write_text(page(data), encoding="utf-8")
     print(f"written to {DOCS / 'lining-in-mpm.md'}")
 
 

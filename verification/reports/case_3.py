@@ -1,17 +1,14 @@
 """Everything that the main job must show, from one run of case 3: a table, its data and the pictures for the docs.
 
-    uv run python benchmarks/case_3.py                 # runs case 3 into runs/case-3 (minutes), then reports
-    uv run python benchmarks/case_3.py --run FOLDER    # reports on a finished run
+    uv run python -m verification.reports.case_3                 # runs case 3 into runs/case-3 (minutes), then reports
+    uv run python -m verification.reports.case_3 --run FOLDER    # reports on a finished run
 
 Writes docs/case-3.md, docs/case-3.json and docs/images/case-3-*.png.
 """
 
 import argparse
 import json
-import os
-import platform
 import shutil
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +24,8 @@ from coupling.datasets import (
     read_pressures,
     read_response,
 )
+from verification.pages import DOCS, made_by, need_docs, provenance
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
 SETTLING = 3.0  # s
 PICTURES = ("fields", "pressures", "internal_forces", "inflow")
 
@@ -229,14 +226,13 @@ def report(folder):
     rows, data = measured(folder)
     attributes, history = read_attributes(folder), read_history(folder)
     steps, points = int(history["steps"][-1]), int(history["point_steps"][-1])
-    machine = f"{os.cpu_count()} cores, {platform.machine()}, Python {platform.python_version()}"
     seconds = float(attributes["cpu_seconds"])
     verdict = {True: "yes", False: "**no**"}
     page = [
         "# Case 3, from the gate to the ring",
         "",
-        f"Made by `uv run python benchmarks/case_3.py` on {datetime.now(UTC):%Y-%m-%d}: revision "
-        f"{attributes['revision']}, {machine}. {steps} steps, {points / 1e9:.2f} thousand million point-steps, "
+        f"{made_by('uv run python -m verification.reports.case_3', attributes['revision'])}. "
+        f"{steps} steps, {points / 1e9:.2f} thousand million point-steps, "
         f"{seconds:.0f} s of processor time, {float(attributes['wall_seconds']):.0f} s by the clock.",
         "",
         "| what | wanted | measured | met |",
@@ -259,7 +255,7 @@ def report(folder):
     ]
     (DOCS / "case-3.md").write_text("\n".join(page), encoding="utf-8")
     data["provenance"] = {k: str(attributes[k]) for k in ("revision", "versions", "created", "scene_sha256")} | {
-        "machine": machine,
+        "machine": provenance()["machine"],
         "cpu_seconds": seconds,
         "steps": steps,
         "point_steps": points,
@@ -274,6 +270,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--run", type=Path, help="folder of a finished run of case 3")
     folder = parser.parse_args().run
+    need_docs()
     if folder is None:
         folder = Path("runs/case-3")
         coupling.run(coupling.load_scene("case-3"), out=folder, overwrite=True, figures=True)

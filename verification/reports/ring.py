@@ -1,7 +1,8 @@
 """CPU time of the beam-spring ring by joint law and number of elements, and its error against closed forms.
 
-Usage: ``python benchmarks/ring.py [RECORDS]``, 1000 when left out. Two tables; in the first, pressures fall around
-90 degrees as time goes on.
+    uv run python -m verification.reports.ring [RECORDS]    # 1000 when left out
+
+Prints two tables; in the first, pressures fall around 90 degrees as time goes on.
 """
 
 import sys

@@ -1,13 +1,29 @@
-"""Records as `mpm.simulate` yields them, made from formulas: for tests of files and pictures without a simulation."""
+"""Records as `mpm.simulate` yields them, made from formulas, and files of them with the answers of two lining models.
+
+For tests of files and pages, and for damage to files, without a simulation.
+"""
 
 import numpy as np
 
 import coupling
+from coupling import datasets
 from coupling.datasets import BALANCES, ERRORS
+from coupling.provenance import root_attributes
+from coupling.run import respond
 from mpm.simulation import Record
 from mpm.variables import CLAMPS, POINT_VARIABLES
 
 THETA = np.sort(np.concatenate([np.arange(0.0, 360.0, 4.0), [88.3, 90.0, 91.7]]))
+
+TIMES = (0.0, 0.25, 0.5, 0.75, 1.0)
+
+
+class TwoTriangles:
+    """The least that a mesh must have to be stored."""
+
+    nodes = np.array([[3.0, -23.0], [4.0, -23.0], [4.0, -24.0], [3.0, -24.0]])
+    elements = np.array([[0, 2, 1], [0, 3, 2]])
+    region = np.array([0, 1])
 
 
 def make_quick_scene(**changes):
@@ -67,3 +83,28 @@ def record(time, n_tunnels=1, snapshot=False):
         cpu_seconds=time,
         points=points(time) if snapshot else None,
     )
+
+
+def moving_record(time):
+    """A record in which every quantity of the lining and of the points changes with time."""
+    made = record(time, snapshot=True)
+    for part in made.lining:
+        part["water_pressure"] = part["water_pressure"] + 20e3 * time * np.cos(np.radians(part["theta"]))
+        part["soil_shear"] = part["soil_shear"] * (1 + 0.2 * time)
+    return made
+
+
+def write_run(path, scene=None, times=TIMES, models=("beam-spring", "continuum"), status="finished"):
+    """File of a synthetic run; the second model is a ring of another theory of bending."""
+    scene = make_quick_scene() if scene is None else scene
+    writer = datasets.RunWriter(path, root_attributes(scene), scene.mpm, TwoTriangles())
+    for time in times:
+        writer.append(moving_record(time))
+    writer.close(status, wall_seconds=12.0, cpu_seconds=11.0)
+    pressures = datasets.read_pressures(path)
+    theories = {"beam-spring": "timoshenko", "continuum": "euler-bernoulli"}
+    for model in models:
+        ring = scene.ring.model_copy(update={"section": theories[model]})
+        response = respond(scene.model_copy(update={"ring": ring}), pressures)
+        datasets.write_response(path, response, model)
+    return path

@@ -1,15 +1,11 @@
 """Numbers and pictures of docs/lining-models.md: both lining models compared, their cost, and the open gate.
 
-uv run python benchmarks/lining_models.py       # under a minute; writes tables and pictures of docs/lining-models.md
+uv run python -m verification.reports.lining_models    # under a minute; writes into docs/lining-models.md
 """
 
-import os
-import platform
 import re
 import time as clock
-from datetime import UTC, datetime
 from functools import cache
-from pathlib import Path
 from types import SimpleNamespace
 
 import matplotlib
@@ -21,12 +17,11 @@ from matplotlib.figure import Figure
 from coupling.compare import compare
 from coupling.compare_figures import forces_compared, joints_compared
 from coupling.figures import RESOLUTION, STYLE
-from coupling.provenance import root_attributes
 from coupling.scene import load_scene
 from structure import BeamSpringLining, ContinuumLining, LiningFailure
 from structure.theory import curved_section_moment, theoretical_pressures
+from verification.pages import DOCS, made_by, need_docs
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
 IMAGES = DOCS / "images"
 GATE = (90.0, 0.2)
 
@@ -253,6 +248,7 @@ def joint_stresses(scene):
 
 def main():
     """Everything, in the order of the document."""
+    need_docs()
     scene = load_scene("case-3")
     difference_table(scene)
     cost(scene)
@@ -260,11 +256,7 @@ def main():
     open_gate(scene)
     joint_details(scene)
     joint_stresses(scene)
-    provenance = (
-        f"Measured on {datetime.now(UTC):%Y-%m-%d}, {platform.machine()}, {os.cpu_count()} cores, Python"
-        f" {platform.python_version()}, revision {root_attributes(scene)['revision']}."
-    )
-    write("provenance", [provenance])
+    write("provenance", [f"{made_by('uv run python -m verification.reports.lining_models')}."])
 
 
 if __name__ == "__main__":

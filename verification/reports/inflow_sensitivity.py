@@ -1,20 +1,16 @@
 """What moves the inflow of case 3: numerical choices, which must not, beside properties of the ground, which must.
 
-    uv run python benchmarks/inflow_sensitivity.py     # some ten minutes on 2 cores; writes docs/inflow-sensitivity.*
+    uv run python -m verification.reports.inflow_sensitivity    # some ten minutes; writes docs/inflow-sensitivity.*
 
 Scene `quick` with K0 = nu/(1 - nu), one thing changed at a time, until 300 kg/m: the times of 100, 200 and 300 kg/m,
 the ring's largest and least moment there, the pressures, and how rough the soil pressure along the ring is.
 """
 
 import json
-import os
-import platform
 import sys
 import time as clock
 from concurrent.futures import ProcessPoolExecutor
-from datetime import UTC, datetime
 from multiprocessing import get_context
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -22,10 +18,9 @@ import xarray as xr
 import coupling
 import mpm
 from coupling.datasets import cell_centres, cell_mean_weights
-from coupling.provenance import root_attributes
 from coupling.run import respond
+from verification.pages import DOCS, made_by, need_docs
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
 MARKS = (100.0, 200.0, 300.0)  # kg/m
 INTERVAL = 0.005  # between looks at the inflow [s]
 AVERAGED = 0.9  # of the last mark: pressures are means from there on
@@ -177,7 +172,7 @@ def spread(rows):
 def main():
     parts = {"numerics": NUMERICS, "physics": PHYSICS}
     chosen = [parts[name] for name in sys.argv[1:] or parts]
-    attributes = root_attributes(coupling.load_scene("quick"))  # the revision that runs
+    need_docs()
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         jobs = [[pool.submit(measure, *row) for row in part] for part in chosen]
         rows = []
@@ -192,8 +187,7 @@ def main():
     page = [
         "# What moves the inflow, and what must not",
         "",
-        f"Made by `uv run python benchmarks/inflow_sensitivity.py` on {datetime.now(UTC):%Y-%m-%d}, revision "
-        f"{attributes['revision']}, {os.cpu_count()} cores, {platform.machine()}. Scene `quick` with K0 = nu/(1 - nu), "
+        f"{made_by('uv run python -m verification.reports.inflow_sensitivity')}. Scene `quick` with K0 = nu/(1 - nu), "
         f"hydraulic conductivity 1e-4 m/s, until {MARKS[-1]:.0f} kg/m; pressures are means over the last tenth of it; "
         f"roughness: rms of the soil pressure on the ring off its mean over 10 degrees to both sides, beyond "
         f"{BESIDE_GATE:.0f} degrees from the gate.",

@@ -1,6 +1,6 @@
 """Make the pictures of docs/tutorial.md and of the page of a study with the program itself.
 
-python docs/draw_tutorial_figures.py [tutorial | study]
+uv run python -m verification.pictures.tutorial [tutorial | study]
 """
 
 import shutil
@@ -13,6 +13,7 @@ from PIL import Image
 
 import coupling
 from coupling.report.page import write_report
+from verification.pages import DOCS, need_docs
 
 FIGURES = ("fields", "pressures", "internal_forces")
 WIDTH, COLOURS = 1100, 128  # pixels, and colours enough for flat areas and lines
@@ -68,7 +69,8 @@ def draw_study(folder, target):
 
 def main(what):
     """Draw one group of pictures, or all."""
-    images = Path(__file__).parent / "images"
+    need_docs()
+    images = DOCS / "images"
     with tempfile.TemporaryDirectory() as folder:
         if what in ("", "tutorial"):
             draw_tutorial(Path(folder), images / "tutorial")

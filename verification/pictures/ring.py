@@ -1,4 +1,7 @@
-"""Draw the figures of docs/ring.md: python docs/draw_ring_figures.py."""
+"""Draw the figures of docs/ring.md.
+
+uv run python -m verification.pictures.ring [FOLDER]    # docs/images when left out
+"""
 
 import sys
 from pathlib import Path
@@ -13,8 +16,8 @@ from coupling.figures import GATE, INITIAL, NOW, RESOLUTION, SECOND, STYLE
 from structure import BeamSpringLining, CapacityRule, Ground, Limits, Ring, SegmentSection, check, theory
 from structure.joint_laws import contact_moment, limited_shear
 from structure.sections import table_3_1
+from verification.pages import DOCS
 
-IMAGES = Path(__file__).parent / "images"
 STIFFNESS, HEIGHT = 5e8, 0.175  # N m/rad per metre, m
 
 
@@ -121,6 +124,6 @@ def example_of_checks():
 
 
 if __name__ == "__main__":
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else IMAGES
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else DOCS / "images"
     joint_laws().savefig(folder / "joint_laws.png", dpi=RESOLUTION)
     example_of_checks().savefig(folder / "ring_checks.png", dpi=RESOLUTION)

@@ -3,25 +3,22 @@
 Scenes are compared over the same simulated time: steps of scenes differ in length, and long steps in the number of
 short ones within them.
 
-uv run python benchmarks/left_out.py       # about four minutes; writes docs/left-out.md and docs/left-out.json
+    uv run python -m verification.reports.left_out    # about four minutes; writes docs/left-out.md and .json
 """
 
 import json
-import os
-import platform
 import statistics
 import tempfile
 import time as clock
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 import coupling
 import mpm
 from coupling.datasets import RunWriter
 from coupling.provenance import root_attributes
+from verification.pages import DOCS, made_by, need_docs
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
 BEGIN, ROUNDS, SPELL = 0.15, 12, 0.015  # simulated seconds after the gate opened, and of a round
 FULL, CROWN, TIGHT = "full", "gate at the crown, whole", "k = 1e-12 m/s"
 
@@ -86,6 +83,7 @@ def advance(solver, time):
 
 
 def main():
+    need_docs()
     rows, solvers = [], {}
     case_3 = coupling.load_scene("case-3")
     for name, without, base, scene in variants(case_3.mpm):
@@ -127,8 +125,7 @@ def main():
     page = [
         "# What leaving out saves",
         "",
-        f"Made by `uv run python benchmarks/left_out.py` on {datetime.now(UTC):%Y-%m-%d}, revision "
-        f"{root_attributes(case_3)['revision']}, {os.cpu_count()} cores, {platform.machine()}. Case 3, one thread, "
+        f"{made_by('uv run python -m verification.reports.left_out')}. Case 3, one thread, "
         f"from {BEGIN:g} to {BEGIN + ROUNDS * SPELL:g} s after the gate opened; processor time a simulated second "
         'and a point-step, and memory of the solver. "Of base" is relative to the full scene; undrained ground is '
         "compared with a conductivity of 1e-12 m/s, the half model with the whole of the same scene. Lower quartile of "

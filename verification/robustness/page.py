@@ -1,26 +1,16 @@
 """The page docs/robustness.md, put together from what fuzz.py, kills.py and lost_worker.py measured."""
 
 import json
-import os
-import platform
-from datetime import UTC, datetime
-from pathlib import Path
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
+from verification.pages import DOCS, provenance
+
 DATA = DOCS / "robustness.json"
 
 
 def write_part(name, result):
     """Store one part with machine, date and revision, and write the page anew."""
-    from coupling.provenance import revision
-
     parts = json.loads(DATA.read_text(encoding="utf-8")) if DATA.exists() else {}
-    parts[name] = {
-        **result,
-        "date": datetime.now(UTC).date().isoformat(),
-        "revision": revision() or os.environ.get("GUSH_REVISION", ""),
-        "machine": f"{_processor()}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}",
-    }
+    parts[name] = {**result, **provenance()}
     DATA.write_text(json.dumps(parts, indent=1) + "\n", encoding="utf-8")
     (DOCS / "robustness.md").write_text(page(parts), encoding="utf-8")
 
@@ -43,7 +33,8 @@ def _scenes(part):
     return [
         "## Generated scenes",
         "",
-        f"`uv run python benchmarks/fuzz.py scenes --count {part['count']} --seed {part['seed']}`. Each scene is the "
+        f"`uv run python -m verification.robustness.fuzz scenes --count {part['count']} --seed {part['seed']}`. "
+        "Each scene is the "
         f"text of a good one ({', '.join(part['bases'])}) with up to six changes: "
         "numbers scaled, nudged or replaced by what is no number, keys "
         "misspelt, dropped and doubled, names that lead out of the folder, bases that are devices or addresses, torn "
@@ -78,7 +69,8 @@ def _files(part):
     return [
         "## Damaged files",
         "",
-        f"`uv run python benchmarks/fuzz.py files --count {part['count']} --seed {part['seed']}`. Bits flipped, blocks "
+        f"`uv run python -m verification.robustness.fuzz files --count {part['count']} --seed {part['seed']}`. "
+        "Bits flipped, blocks "
         "zeroed, overwritten with noise, cut out, doubled or moved, files cut short, emptied or continued; then "
         "everything that reads such a file, in a process of its own with limits on memory and time. A file must be "
         "refused with its name and a remedy, or give what the whole file gives.",
@@ -104,7 +96,8 @@ def _pressures(part):
     return [
         "## Imported pressures",
         "",
-        f"`uv run python benchmarks/fuzz.py pressures --count {part['count']} --seed {part['seed']}`. netCDF files of "
+        f"`uv run python -m verification.robustness.fuzz pressures --count {part['count']} --seed {part['seed']}`. "
+        "netCDF files of "
         "random pressures in random units, orders and precisions, each with one mistake or none. The generator knows "
         "what was meant: a file must give that, be warned of, or be refused with rule, value and remedy.",
         "",
@@ -123,7 +116,8 @@ def _rings(part):
     return [
         "## Random rings",
         "",
-        f"`uv run python benchmarks/fuzz.py rings --count {part['count']} --seed {part['seed']}`. Rings of 3 to 12 "
+        f"`uv run python -m verification.robustness.fuzz rings --count {part['count']} --seed {part['seed']}`. "
+        "Rings of 3 to 12 "
         "joints anywhere, some without a stiffness, in all kinds of soil springs and in none, under random loads in "
         "balance, by beams on springs and by the continuum.",
         "",
@@ -147,7 +141,8 @@ def _kills(part):
     return [
         "## Kills",
         "",
-        f"`uv run python benchmarks/kills.py --kills {part['kills']} --seed {part['seed']}`. A small run that takes "
+        f"`uv run python -m verification.robustness.kills --kills {part['kills']} --seed {part['seed']}`. "
+        "A small run that takes "
         f"{part['life_seconds']:.1f} s of processor time is ended by SIGKILL at a moment drawn evenly over that time, "
         "and resumed; every fourth resumed one is killed again. What the kills left behind:",
         "",
@@ -168,7 +163,8 @@ def _lost_worker(part):
     return [
         "## A lost worker",
         "",
-        f"`uv run python benchmarks/lost_worker.py {part['runs']}`. A study of {part['runs']} coarse runs on a dask "
+        f"`uv run python -m verification.robustness.lost_worker {part['runs']}`. "
+        "A study of {part['runs']} coarse runs on a dask "
         f"scheduler with two worker processes, of which {part['workers_killed']} was killed in the middle, against the "
         "same study in one process.",
         "",
@@ -193,11 +189,3 @@ def _faults(faults):
 def _where(part):
     note = ["", part["note"]] if "note" in part else []
     return [*note, "", f"Measured {part['date']} at revision {part['revision'] or 'unknown'} on {part['machine']}."]
-
-
-def _processor():
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="ascii", errors="replace").splitlines()
-    except OSError:
-        return platform.machine()
-    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.machine())

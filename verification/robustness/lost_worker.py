@@ -1,6 +1,6 @@
 """A study on a dask scheduler with two worker processes, one of them killed in the middle, against a serial run.
 
-    uv run python benchmarks/lost_worker.py           # 64 coarse runs; fewer, from 4 on, as an argument
+    uv run python -m verification.robustness.lost_worker           # 64 coarse runs; fewer, from 4 on, as an argument
 
 The study must end complete and equal to the serial one, bit for bit. Prints what happened as JSON and writes its part
 of docs/robustness.md and docs/robustness.json, with --print-only not.
@@ -10,7 +10,6 @@ import argparse
 import json
 import os
 import signal
-import sys
 import tempfile
 import time as clock
 from pathlib import Path
@@ -19,18 +18,9 @@ import numpy as np
 
 import coupling
 from coupling.scene import load_scene
+from verification.pages import need_docs
+from verification.small_event import COARSE
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-
-COARSE = {
-    "element_size": 5.0,
-    "element_size_lining": 0.9,
-    "element_size_interior": 0.6,
-    "elements_across_gate": 2,
-    "gate_radius": 0.5,
-    "size_growth": 0.5,
-    "points_per_element_gate": 3,
-}
 #: Of every run: how far it differs from nothing but where and when it was computed.
 MEASURED = ("cpu_seconds", "status", "message")
 
@@ -84,6 +74,8 @@ def main():
     parser.add_argument("--print-only", action="store_true", help="leave docs/robustness.md as it is")
     chosen = parser.parse_args()
     count = chosen.count
+    if not chosen.print_only:
+        need_docs()
     with tempfile.TemporaryDirectory() as place:
         begin = clock.monotonic()
         parallel, lines, killed = killed_study(count, Path(place) / "parallel")
@@ -105,7 +97,7 @@ def main():
         "serial_seconds": end - between,
     }
     if not chosen.print_only:
-        from robustness_page import write_part
+        from verification.robustness.page import write_part
 
         write_part("lost_worker", result)
     print(json.dumps(result, indent=1))

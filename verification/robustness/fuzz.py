@@ -1,6 +1,6 @@
 """Generated scenes and damaged files: each must give a plan, the right content, or a refusal that says what to do.
 
-    uv run python benchmarks/fuzz.py [scenes | files | pressures | rings] [--count N] [--seed 0]
+    uv run python -m verification.robustness.fuzz [scenes | files | pressures | rings] [--count N] [--seed 0]
 
 10 000 scenes, 1 000 files, 2 000 imported pressures and 200 rings when left out. Writes its
 parts of docs/robustness.md and docs/robustness.json.
@@ -17,8 +17,8 @@ import traceback
 from collections import Counter
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "benchmarks")]
+from verification.pages import need_docs
+
 COUNTS = {"scenes": 10_000, "files": 1_000, "pressures": 2_000, "rings": 200}
 PYTHON_EVERY = 4  # every so many scenes also as Python dictionaries
 SIMULATED = 4  # of every base
@@ -53,7 +53,9 @@ def main():
     parser.add_argument("--count", type=int)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    from robustness_page import write_part
+    from verification.robustness.page import write_part
+
+    need_docs()
 
     faults = 0
     for what in [options.what] if options.what else COUNTS:
@@ -70,10 +72,9 @@ def main():
 
 def scenes(place, count, seed):
     """Judge generated scenes; simulate some of those that can be planned."""
-    import wild_scenes
-    from small_event import small_scene
-
     import coupling
+    from verification.robustness import wild_scenes
+    from verification.small_event import small_scene
 
     file, bases = place / "mine.toml", {name: small_scene(**SHORT, **changes).source for name, changes in BASES.items()}
     verdicts, dotted, faults, slowest, planned = Counter(), Counter(), [], 0.0, []
@@ -117,9 +118,8 @@ def scenes(place, count, seed):
 
 def changed_by_names(chance, place, kind, text):
     """Verdict on a good scene that is changed by dotted names, right and wrong ones."""
-    import wild_scenes
-
     import coupling
+    from verification.robustness import wild_scenes
 
     file = place / f"{kind.replace(' ', '-')}.toml"
     file.write_text(text, encoding="utf-8")
@@ -134,10 +134,10 @@ def changed_by_names(chance, place, kind, text):
 def simulation_fault(place, text, number):
     """What is wrong with how a scene runs, "" where it ends well: finished and finite, or failed with a reason."""
     import numpy as np
-    from damaged_files import in_a_process
 
     from coupling import load_scene, run
     from coupling.datasets import raw_groups
+    from verification.robustness.damaged_files import in_a_process
 
     scene = place / f"run-{number}.toml"
     scene.write_text(text, encoding="utf-8")
@@ -158,7 +158,7 @@ def simulation_fault(place, text, number):
 
 def files(place, count, seed):
     """Judge damaged files of every kind."""
-    import damaged_files
+    from verification.robustness import damaged_files
 
     good = good_files(place / "whole")
     verdicts, faults = {}, []
@@ -189,11 +189,11 @@ def good_files(place):
     """One whole file of every kind, by kind."""
     import h5netcdf
     import numpy as np
-    from report_run import write_run
-    from small_event import small_scene
 
     from coupling import checkpoint, journal
     from coupling.datasets import CHECKED_FORMAT
+    from verification.small_event import small_scene
+    from verification.synthetic_run import write_run
 
     place.mkdir()
     run = write_run(place / "run.nc", times=(0.0, 0.5), models=("beam-spring",))
@@ -214,9 +214,8 @@ def good_files(place):
 
 def pressures(place, count, seed):
     """Judge files of imported pressures with mistakes of which the generator knows what was meant."""
-    import wild_pressures
-
     import coupling
+    from verification.robustness import wild_pressures
 
     ring, file = coupling.load_scene("case-3").ring.model_dump_json(), place / "mine.nc"
     verdicts, faults = {}, []
@@ -238,9 +237,9 @@ def rings(place, count, seed):
     import re
 
     import numpy as np
-    from test_random_rings import SPRINGS, WAYS, outcome, random_balanced_loads, random_ring
 
     from structure import BeamSpringLining, ContinuumLining
+    from verification.robustness.random_rings import SPRINGS, WAYS, outcome, random_balanced_loads, random_ring
 
     rng, kinds = np.random.default_rng(seed), list(SPRINGS.values())
     verdicts, reasons, faults, differences = Counter(), Counter(), [], []

@@ -1,0 +1,116 @@
+"""Rings of any joints and springs under random loads in balance, and what a lining model makes of them."""
+
+import numpy as np
+import xarray as xr
+
+from structure import Ground, LiningFailure, Ring
+
+RADIUS = 3.3
+LINING = dict(outer_diameter=6.6, inner_diameter=5.9, concrete_modulus=34.5e9, concrete_poissons_ratio=0.2)
+ORDINARY = dict(joint_rotational_stiffness=5e8, joint_normal_stiffness=6e8, joint_shear_stiffness=8e7)
+#: What each kind of soil spring is called with.
+SPRINGS = {
+    "none": None,
+    "radial, pressing only": dict(tangential_springs=False),
+    "radial, two-way": dict(tangential_springs=False, two_way=True),
+    "hyperbolic": {},
+    "linear": dict(law="linear"),
+    "at the centre line": dict(slip_at="centre_line"),
+}
+#: How the joint that moves most moves, and the stiffness that it lacks.
+WAYS = {"turns": "joint_rotational_stiffness", "slides": "joint_shear_stiffness",
+        "opens or closes": "joint_normal_stiffness"}  # fmt: skip
+
+
+def random_angles(rng):
+    """3 to 12 joints at least 4 degrees apart."""
+    count = rng.integers(3, 13)
+    while True:
+        angles = np.sort(rng.uniform(0, 360, count))
+        if np.diff(angles, append=angles[0] + 360).min() > 4:
+            return tuple(angles)
+
+
+def random_ring(rng, springs):
+    def stiffness(low, high, none):
+        return 0.0 if rng.random() < none else 10 ** rng.uniform(low, high)
+
+    ground = None
+    if springs is not None:
+        ground = Ground(
+            youngs_modulus=10 ** rng.uniform(6.5, 8.3),
+            poissons_ratio=rng.uniform(0, 0.45),
+            cohesion=rng.choice([0.0, 10 ** rng.uniform(3, 5)]),
+            friction_angle=rng.choice([0.0, rng.uniform(5, 45)]),
+            vertical_stress=2e5,
+            horizontal_stress=rng.uniform(0.3, 1.2) * 2e5,
+            **springs,
+        )
+    return Ring(
+        **LINING,
+        concrete_unit_weight=rng.choice([0.0, 25e3]),
+        joint_angles=random_angles(rng),
+        joint_rotational_stiffness=stiffness(6.5, 10, 0.15),
+        joint_normal_stiffness=stiffness(7, 11, 0.05),
+        joint_shear_stiffness=stiffness(7, 10, 0.05),
+        ground=ground,
+        balance_uplift=True,
+    )
+
+
+def integral(theta, values, factor):
+    """Of values at angles [rad], linear between them, times a function of the angle: 8 Gauss points between samples."""
+    length = np.diff(theta, append=theta[0] + 2 * np.pi)
+    points, weights = np.polynomial.legendre.leggauss(8)
+    share = (points + 1) / 2
+    between = values[:, None] * (1 - share) + np.roll(values, -1)[:, None] * share
+    return (length[:, None] * weights / 2 * between * factor(theta[:, None] + length[:, None] * share)).sum()
+
+
+def sums(theta, pressure, shear):
+    """Force to the right and up, and torque over the radius, over the radius [Pa]."""
+    one = np.ones_like
+    return np.array(
+        [
+            integral(theta, shear, np.cos) - integral(theta, pressure, np.sin),
+            -integral(theta, shear, np.sin) - integral(theta, pressure, np.cos),
+            integral(theta, shear, one),
+        ]
+    )
+
+
+def random_balanced_loads(rng):
+    """Pressures and shear of random harmonics at random angles, without resultants."""
+    count = int(rng.integers(24, 400))
+    # one angle in each of `count` equal parts, anywhere in it or at its beginning: no gap that is refused
+    within = rng.uniform(0, 1, count) if rng.random() < 0.5 else 0.0
+    degrees = (np.arange(count) + within) * 360 / count
+    theta = np.radians(degrees)
+    mean = rng.uniform(1e5, 5e5)
+    size = rng.uniform(0, 0.15) * mean
+
+    def harmonics(first):
+        return sum(size / k * rng.normal() * np.cos(k * theta + rng.uniform(0, 2 * np.pi)) for k in range(first, 7))
+
+    traction = np.stack([mean + harmonics(2), 0.3 * harmonics(1)])
+    zero = np.zeros_like(theta)
+    basis = np.array([(np.sin(theta), zero), (np.cos(theta), zero), (zero, zero + 1)])
+    of_basis = np.stack([sums(theta, *each) for each in basis], axis=1)
+    traction -= np.tensordot(np.linalg.solve(of_basis, sums(theta, *traction)), basis, 1)
+    return loads_of(degrees, *traction)
+
+
+def loads_of(degrees, pressure, shear):
+    parts = {"soil_pressure": 0.6 * pressure, "water_pressure": 0.4 * pressure, "soil_shear": shear}
+    return xr.Dataset(
+        {name: (("time", "theta"), values[None]) for name, values in parts.items()},
+        coords={"time": [0.0], "theta": degrees},
+    )
+
+
+def outcome(model, ring, loads):
+    """The response, or the reason of the refusal in words."""
+    try:
+        return model(ring).respond(loads).isel(time=0)
+    except LiningFailure as refusal:
+        return str(refusal)
