@@ -11,6 +11,7 @@ from test_ring_joints_and_springs import pressures as gushing_pressures
 
 from structure import BeamSpringLining, ContinuumLining, Ground, LiningFailure, Ring, theory
 from structure.lining import RESPONSE
+from verification.problems import exact_rings
 
 JOINTS = (8.0, 73.0, 138.0, 222.0, 287.0, 352.0)
 BOTH = pytest.mark.parametrize("model", [BeamSpringLining, ContinuumLining])
@@ -190,10 +191,10 @@ def refinement_errors(columns, layers):
         coords={"time": [0.0], "theta": degrees},
     )
     response = ContinuumLining(free, columns=columns, layers=layers).respond(loads).isel(time=0)
-    exact = theory.thick_ring_cos2(6e4, 0.0, 2.95, 3.3, 34.5e9, 0.2)
+    exact = exact_rings.thick_ring_cos2(6e4, 0.0, 2.95, 3.3, 34.5e9, 0.2)
     across = np.linspace(2.95, 3.3, 2001)
     moved = np.trapezoid(exact.radial_displacement(across, 0.0), across) / 0.35
-    expected = theory.radial_cos2(6e4 * 3.3 / 3.125, 3.125, np.radians(response["theta"].values))
+    expected = exact_rings.radial_cos2(6e4 * 3.3 / 3.125, 3.125, np.radians(response["theta"].values))
     return np.array(
         [abs(response["convergence_vertical"].item() / (-2 * moved) - 1)]
         + [largest(response[name] - getattr(expected, name)) / largest(getattr(expected, name)) for name in RING_FORCES]

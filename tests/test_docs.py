@@ -161,7 +161,7 @@ def test_page_works(page, followed, tmp_path, monkeypatch):
 
 def test_docstring_examples_hold():
     attempted = 0
-    for package in ("mpm", "structure", "coupling"):
+    for package in ("mpm", "structure", "coupling", "verification"):
         root = importlib.import_module(package)
         names = [package, *(m.name for m in pkgutil.walk_packages(root.__path__, f"{package}."))]
         for name in names:

@@ -12,7 +12,7 @@ from mpm.contact import FIXED_X, FIXED_Y
 from mpm.lining import ElasticRing, RigidRing
 from mpm.variables import SXX, SXY, SYY, SZZ, V_SX, V_SY, VSX
 from mpm.wall import NODE_STATE, reaction_kernel
-from structure import theory
+from verification.problems import exact_rings
 from verification.small_event import small_scene
 
 MODULUS, NU, DENSITY = 34.5e9, 0.2, 2548.0
@@ -84,9 +84,9 @@ def test_static_ring_carries_the_closed_forms(case):
     ring = ring_of(thickness, radius=radius)
     nothing = np.zeros_like
     inward, clockwise, expected = {
-        "uniform": (lambda a: p + 0 * a, nothing, theory.uniform_pressure),
-        "cos2": (lambda a: p * np.cos(2 * a), nothing, theory.radial_cos2),
-        "shear": (nothing, lambda a: p * np.sin(2 * a), theory.tangential_sin2),
+        "uniform": (lambda a: p + 0 * a, nothing, exact_rings.uniform_pressure),
+        "cos2": (lambda a: p * np.cos(2 * a), nothing, exact_rings.radial_cos2),
+        "shear": (nothing, lambda a: p * np.sin(2 * a), exact_rings.tangential_sin2),
     }[case]
     forces = ring.internal_forces(loaded(ring, radius, inward, clockwise), THETA)
     scale = (p * radius, p * radius, p * radius**2)
@@ -98,7 +98,7 @@ def test_thick_elastic_ring_deforms_as_the_exact_one():
     inner, outer, p = 2.95, 3.3, 1e4
     ring = ring_of(outer - inner)
     x = loaded(ring, outer, lambda a: p * np.cos(2 * a), np.zeros_like)
-    exact = theory.thick_ring_cos2(p, 0.0, inner, outer, MODULUS, NU)
+    exact = exact_rings.thick_ring_cos2(p, 0.0, inner, outer, MODULUS, NU)
     moved = np.einsum("kdm,m->kd", ring.motion([0.0, np.pi / 2], outer), x)
     # sections without shear deformation: 4 E I/(G A_s R^2) = 1.3 % too stiff
     assert moved[0, 1] - moved[1, 0] == pytest.approx(2 * exact.radial_displacement(outer, 0.0), rel=0.015)
@@ -141,7 +141,7 @@ def test_formula_of_a_bonded_ring_is_that_of_michell_and_the_beam():
     x = np.zeros(len(ring.weight))
     x[pick] = moved @ c_d
     moment = ring.internal_forces(x, [np.pi / 2])[2][0]
-    assert moment / (p * r**2) == pytest.approx(theory.einstein_schwartz_no_slip_moment(k0, nu, *ratios), rel=1e-4)
+    assert moment / (p * r**2) == pytest.approx(exact_rings.einstein_schwartz_no_slip_moment(k0, nu, *ratios), rel=1e-4)
 
 
 @pytest.fixture(scope="module")
@@ -177,9 +177,9 @@ def test_ring_in_elastic_ground_is_that_of_einstein_and_schwartz(deep_scene, sli
     lining = tunnel.lining_modulus / (1 - tunnel.lining_poissons_ratio**2)
     stiff = scene.soils[0].youngs_modulus / (1 - nu**2) / lining
     flexibility, compressibility = stiff * radius**3 * 12 / thickness**3, stiff * radius / thickness
-    expected = theory.einstein_schwartz_no_slip_moment(k0, nu, flexibility, compressibility)
+    expected = exact_rings.einstein_schwartz_no_slip_moment(k0, nu, flexibility, compressibility)
     if slip == "full":
-        expected = theory.einstein_schwartz_full_slip_moment(k0, nu, flexibility)
+        expected = exact_rings.einstein_schwartz_full_slip_moment(k0, nu, flexibility)
     forces = solver.moving.motion_at(0, np.array([0.0, 90.0]))["bending_moment"]
     # Linear triangles of 0.3 m are too stiff for a field that bends, most where the ground slips: 3 % and 1 %.
     assert 0.5 * (forces[1] - forces[0]) / (p * radius**2) == pytest.approx(expected, rel=0.04)

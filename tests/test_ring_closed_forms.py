@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 
 from structure import BeamSpringLining, ContinuumLining, Ground, Ring, theory
+from verification.problems import exact_rings
 
 THIN = 0.02  # thickness over radius; stretching then changes displacements by (t/R)^2/12 = 3e-5
 
@@ -47,12 +48,12 @@ def angles(response):
 def test_uniform_pressure_gives_thrust_on_the_outer_face_and_no_moment(model):
     free = ring()
     response = model(free).respond(pressures(lambda a: 3e5))
-    thrust = theory.uniform_pressure(3e5, free.outer_radius, angles(response)).axial_force
+    thrust = exact_rings.uniform_pressure(3e5, free.outer_radius, angles(response)).axial_force
     # 5e-5: the load polygon of one-degree chords, span^2/24 = 1.3e-5, and as much from the linear shares.
     assert relative_error(response, "axial_force", thrust) < 5e-5
     # Beams have none. Hoop stress in a thick ring is larger inside: its moment about the centre line is Lamé's.
     radius = np.linspace(free.inner_diameter / 2, free.outer_radius, 2001)
-    hoop = theory.thick_ring_uniform(3e5, radius[0], radius[-1], radius)[1]
+    hoop = exact_rings.thick_ring_uniform(3e5, radius[0], radius[-1], radius)[1]
     moment = np.trapezoid(hoop * (radius - free.centre_radius), radius) if model is ContinuumLining else 0.0
     # 1e-8 of N R: rounding, there is no other source of moment. 1e-4 of Lamé's: two elements across the thickness.
     assert np.abs(response["bending_moment"] - moment).max() < max(1e-8 * 3e5 * 3.3 * 3.125, 1e-4 * moment)
@@ -63,7 +64,7 @@ def test_cos2_pressure_gives_the_equilibrium_forces(model):
     free = ring()
     response = model(free).respond(pressures(lambda a: 6e4 * np.cos(2 * a)))
     on_centre_line = 6e4 * free.outer_radius / free.centre_radius
-    expected = theory.radial_cos2(on_centre_line, free.centre_radius, angles(response))
+    expected = exact_rings.radial_cos2(on_centre_line, free.centre_radius, angles(response))
     for name in expected._fields:
         # 5e-4: one-degree elements resolve cos(2a) to (2 span)^2/8 = 1.5e-4; twice linear (samples, shares).
         assert relative_error(response, name, getattr(expected, name)) < 5e-4
@@ -73,7 +74,7 @@ def test_cos2_pressure_gives_the_equilibrium_forces(model):
 def test_cos2_displacement_includes_bending_stretching_and_shear(section):
     free = ring(section=section)
     response = BeamSpringLining(free).respond(pressures(lambda a: 6e4 * np.cos(2 * a)))
-    expected = theory.radial_cos2_displacement(
+    expected = exact_rings.radial_cos2_displacement(
         6e4 * free.outer_radius / free.centre_radius,
         free.centre_radius,
         free.bending_stiffness,
@@ -96,7 +97,7 @@ def test_continuum_has_the_displacements_and_stresses_of_the_exact_thick_ring(ta
         {name: (("time", "theta"), values[None]) for name, values in fields.items()},
         coords={"time": [0.0], "theta": degrees},
     )
-    exact = theory.thick_ring_cos2(6e4, tangential, free.inner_diameter / 2, free.outer_radius, 34.5e9, 0.2)
+    exact = exact_rings.thick_ring_cos2(6e4, tangential, free.inner_diameter / 2, free.outer_radius, 34.5e9, 0.2)
     model = ContinuumLining(free)
     across = np.linspace(free.inner_diameter / 2, free.outer_radius, 2001)
     mean = np.trapezoid(exact.radial_displacement(across, 0.0), across) / free.thickness
@@ -116,7 +117,7 @@ def test_thin_ring_deflects_by_plane_strain_bending_alone(model):
     response = model(thin).respond(pressures(lambda a: 1e2 * np.cos(2 * a)))
     # Written out, so that the ring's own property is checked too: a tunnel is in plane strain.
     bending_stiffness = 34.5e9 / (1 - 0.2**2) * (THIN * 3.125) ** 3 / 12
-    expected = theory.radial_cos2_displacement(
+    expected = exact_rings.radial_cos2_displacement(
         1e2 * thin.outer_radius / thin.centre_radius, thin.centre_radius, bending_stiffness
     )
     # 1e-3: shear adds 4 EI/(G A_s R^2) = 4e-4 at this thickness, discretisation the rest.
@@ -128,8 +129,8 @@ def test_shear_acts_on_the_outer_face_with_its_couple(model):
     free = ring()
     response = model(free).respond(pressures(lambda a: 0.0, lambda a: 6e4 * np.sin(2 * a)))
     ratio = free.outer_radius / free.centre_radius
-    force = theory.tangential_sin2(6e4 * ratio, free.centre_radius, angles(response))
-    couple = theory.distributed_couple_sin2(6e4 * ratio * free.thickness / 2, free.centre_radius, angles(response))
+    force = exact_rings.tangential_sin2(6e4 * ratio, free.centre_radius, angles(response))
+    couple = exact_rings.distributed_couple_sin2(6e4 * ratio * free.thickness / 2, free.centre_radius, angles(response))
     for name in force._fields:
         # 5e-4 as for the cos2 pressure.
         assert relative_error(response, name, getattr(force, name) + getattr(couple, name)) < 5e-4
@@ -142,7 +143,7 @@ def test_self_weight_on_a_point_support(model):
     weight = 25e3 * thin.thickness
     angle = angles(response)
     right = angle < np.pi
-    expected = theory.self_weight_on_point_support(weight, thin.centre_radius, angle[right])
+    expected = exact_rings.self_weight_on_point_support(weight, thin.centre_radius, angle[right])
     for name in expected._fields:
         error = np.abs(response[name].values[0, right] - getattr(expected, name)).max()
         # 1e-3 of the largest: one-degree chords at the kink over the support, and stretching (t/R)^2/12 = 3e-5.
@@ -175,10 +176,10 @@ def test_winkler_ring_under_cos2_pressure_and_shear(model, thickness, tangential
     stiffness = embedded.bending_stiffness
     if not beam:
         # The formula's ring bends only; the exact thick ring also shears and stretches, so take its stiffness.
-        soft = theory.thick_ring_cos2(1.0, 0.0, embedded.inner_diameter / 2, embedded.outer_radius, 34.5e9, 0.2)
+        soft = exact_rings.thick_ring_cos2(1.0, 0.0, embedded.inner_diameter / 2, embedded.outer_radius, 34.5e9, 0.2)
         moved = soft.radial_displacement(embedded.outer_radius, 0.0)
         stiffness = -embedded.outer_radius * embedded.centre_radius**3 / (9 * moved)
-    expected = theory.winkler_cos2_displacement(
+    expected = exact_rings.winkler_cos2_displacement(
         2e4,
         1e4 * tangential,
         embedded.centre_radius,
@@ -207,8 +208,8 @@ def test_hinged_ring_closes_its_rotations(model):
     )
     response = model(hinged).respond(pressures(lambda a: 1e2 * np.cos(2 * a)))
     load = 1e2 * hinged.outer_radius / hinged.centre_radius
-    rigid = theory.radial_cos2(load, hinged.centre_radius, np.radians(sorted(joints))).bending_moment
-    expected = theory.hinge_moments(rigid, 2e5, hinged.centre_radius, hinged.bending_stiffness)
+    rigid = exact_rings.radial_cos2(load, hinged.centre_radius, np.radians(sorted(joints))).bending_moment
+    expected = exact_rings.hinge_moments(rigid, 2e5, hinged.centre_radius, hinged.bending_stiffness)
     # The redundant moment must matter for the test to mean something.
     assert np.abs(expected - rigid).max() > 0.05 * np.abs(rigid).max()
     # 1e-3 of the largest: discretisation of the load and of the chords.
@@ -226,7 +227,7 @@ def test_opposite_point_loads(model):
     response = model(free).respond(loaded)
     angle = angles(response)
     away = (angle > np.radians(3)) & (angle < np.radians(177))
-    expected = theory.opposite_point_loads(force, free.centre_radius, angle[away]).bending_moment
+    expected = exact_rings.opposite_point_loads(force, free.centre_radius, angle[away]).bending_moment
     # 2e-3 of P R/pi: the load is spread over two degrees, which lowers the mean moment by about span/6.
     assert np.abs(response["bending_moment"].values[0, away] - expected).max() < 2e-3 * force * 3.125 / np.pi
 

@@ -19,6 +19,7 @@ from coupling.datasets import cell_centres, cell_mean_weights
 from coupling.provenance import root_attributes
 from structure import theory
 from verification.pages import DOCS, made_by, need_docs, provenance
+from verification.problems import exact_rings
 
 KINDS = ("fixed", "floating", "elastic")
 PRESSURES = ("soil_pressure", "water_pressure", "soil_shear")
@@ -230,8 +231,8 @@ def closed_forms(scene, ring):
     f, c = stiff * ring.centre_radius**3 / ring.bending_stiffness, stiff * ring.centre_radius / ring.axial_stiffness
     return {
         f"K0 = {k:.3f}": {
-            "bonded": scale * theory.einstein_schwartz_no_slip_moment(k, nu, f, c),
-            "full slip": scale * theory.einstein_schwartz_full_slip_moment(k, nu, f),
+            "bonded": scale * exact_rings.einstein_schwartz_no_slip_moment(k, nu, f, c),
+            "full slip": scale * exact_rings.einstein_schwartz_full_slip_moment(k, nu, f),
         }
         for k in (soil.k0, nu / (1 - nu))
     }

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from structure import BeamSpringLining, Ground, Ring, theory
+from verification.problems import exact_rings
 
 SOIL = dict(
     youngs_modulus=40e6,
@@ -77,8 +78,8 @@ def closed_form_errors():
         response = model.respond(pressures)
         spent = time.process_time() - start
         on_centre_line, radius = 6e4 * ring.outer_radius / ring.centre_radius, ring.centre_radius
-        exact = theory.radial_cos2(on_centre_line, radius, np.radians(response["theta"].values))
-        deflection = theory.radial_cos2_displacement(
+        exact = exact_rings.radial_cos2(on_centre_line, radius, np.radians(response["theta"].values))
+        deflection = exact_rings.radial_cos2_displacement(
             on_centre_line, radius, ring.bending_stiffness, ring.axial_stiffness, ring.shear_stiffness
         )
         errors = [np.abs(response[name][0] - values).max() / np.abs(values).max() for name, values in
