@@ -5,7 +5,6 @@ is used or the help lists them.
 """
 
 from functools import cached_property
-from importlib.metadata import entry_points
 
 import typer
 from typer.core import TyperGroup
@@ -20,6 +19,8 @@ class JoinedCommands(TyperGroup):
 
     @cached_property
     def _entries(self):
+        from importlib.metadata import entry_points
+
         return [entry for entry in entry_points(group=ENTRY_POINTS) if entry.name not in self.commands]
 
     def list_commands(self, ctx):
