@@ -1,0 +1,1 @@
+"""Pictures of the docs, drawn with the program itself."""

@@ -1,0 +1,1 @@
+"""Report pages of the docs that are no command of `gush`: each module measures, then writes its page."""
