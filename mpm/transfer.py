@@ -80,7 +80,7 @@ from mpm.variables import (
 # Area spanned by the ways between the points' centres in opposite elements, over that of the quadrilateral, below which
 # they give no slope; 4/9 where they lie in the middle of their elements.
 UNKNOWN_SLOPE = 0.05
-# Volume of points over area from which a quadrilateral begins to count, and counts entirely, as one without free surface.
+# Volume of points over area from which a quadrilateral begins to count as one without free surface, and does so fully.
 HALF_FULL, FULL = 0.5, 0.75
 AHEAD = 16  # points whose rows are on the way into the cache: their order is known, the machine does not guess it
 
