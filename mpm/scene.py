@@ -319,7 +319,7 @@ class Numerics(Part):
     courant: float = Field(default=0.8, gt=0, le=1)
     pic_rate: Annotated[float, in_unit("1/s")] = Field(default=1.0, ge=0)
     pressure_filter: float = Field(default=0.4, ge=0, le=1)
-    stress_damping: float = Field(default=0.5, ge=0, le=2)
+    stress_damping: float = Field(default=0.25, ge=0, le=2)
     critical_step: Literal["altitude", "spectral"] = "spectral"
     local_time_stepping: bool = True
     relaxation_tolerance: float = Field(default=1e-5, gt=0, lt=1)
