@@ -139,11 +139,12 @@ class RecordedSimulation:
         share, scene = self.simulation.unborne_shear, self.scene.mpm
         write_attributes(self.folder / RUN_FILE, initial_unborne_shear=share)
         if share > MOST_UNBORNE:
-            asked = math.ceil(100 * max(scene.bond_friction(tunnel) for tunnel in scene.tunnels)) / 100
+            asked = max(scene.bond_friction(tunnel) for tunnel in scene.tunnels)
+            rougher = f"give a coefficient of {math.ceil(100 * asked) / 100:g} or more, or " if asked <= 2 else ""
             self.warn(
                 "initial_contact = 'bonded' must be borne by tunnels.friction_coefficient, which bears "
-                f"{1 - share:.0%} of its shear: the ground has slipped along the lining before the gate opens; give a "
-                f"coefficient of {asked:g} or more, or write initial_contact = 'frictional' if slip is meant"
+                f"{1 - share:.0%} of its shear: the ground has slipped along the lining before the gate opens; "
+                f"{rougher}write initial_contact = 'frictional' if slip is meant"
             )
         elif share > 0:
             log.info("initial state: friction does not bear %.1f %% of the bonded shear, which is let go", 100 * share)
