@@ -116,7 +116,11 @@ def _base(study, known):
 
 def _own_cases(parameters, name, base):
     """Cases that leave all other parameters as the base has them."""
-    others = [values == values[base] for other, values in parameters.items() if other != name]
+    others = [
+        (values == values[base]) | ((values != values) & (values[base] != values[base]))  # what has no number is nan
+        for other, values in parameters.items()
+        if other != name
+    ]
     return np.logical_and.reduce(others) if others else np.ones(len(parameters[name]), bool)
 
 
