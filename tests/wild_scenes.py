@@ -72,6 +72,7 @@ RIGHT = (
     ("soils.0.youngs_modulus", "30 MPa", 3e7), ("soils.0.cohesion", "2 kPa", 2e3), ("soils.0.porosity", "44 %", 0.44),
     ("soils.0.hydraulic_conductivity", "8.64 m/day", 1e-4), ("stop.time", "20 ms", 0.02),
     ("discretisation.element_size", "600 cm", 6.0), ("gravity", "981 cm/s^2", 9.81), ("water.density", 1010, 1010.0),
+    ("soils.0.k0", 0.5, 0.5), ("soils.0.k0", None, None),
 )  # fmt: skip
 #: Dotted names, most of which name nothing.
 DOTTED = (

@@ -57,6 +57,7 @@ def sensitivity(study, quantity):
     rows = {}
     for name, parameter in parameters.items():
         own = known & _own_cases(parameters, name, base) if alone else known
+        own = own & (parameter == parameter)  # cases without a number, nan, say nothing of it
         if len(set(parameter[own].tolist())) > 1:
             rows[name] = _effect(parameter[own], values[own], alone)
     if not rows:
