@@ -41,12 +41,13 @@ def plan(
     Returns
     -------
     dict
-        scene; features: list of {feature, active, reason}; initial_k0: see :func:`initial_k0`;
-        elements, nodes, points; min_altitude [m]; min_angle [degree]; dt [s]; dt_limit; stop_time [s] or None; stop_inflow_mass [kg/m] or None; steps_at_most (None without
-        a stop time); expected_time [s] and expected_steps: rough where the run stops at an inflow mass; steps are those
-        of the smallest elements, cut to the output interval; expected_point_steps: updates of one point by one step;
-        records; memory_bytes, free_memory_bytes; point_steps_per_second: measured now; expected_seconds: of stepping,
-        without mesh, relaxation and pictures. Steps are counted with the step of the initial state.
+        scene; features: list of {feature, active, reason}; initial_k0: see :func:`initial_k0`; elements, nodes, points;
+        min_altitude [m]; min_angle [degree]; dt [s]; dt_limit; stop_time [s] or None; stop_inflow_mass [kg/m] or None;
+        steps_at_most (None without a stop time); expected_time [s] and expected_steps: rough where the run stops at an
+        inflow mass; steps are those of the smallest elements, cut to the output interval; expected_point_steps: updates
+        of one point by one step; records; memory_bytes, free_memory_bytes; point_steps_per_second: measured now;
+        expected_seconds: of stepping, without mesh, relaxation and pictures. Steps are counted with the step of the
+        initial state.
     """
     import mpm
 
@@ -304,9 +305,7 @@ def initial_k0(scene: MpmScene) -> list[dict[str, Any]]:
         depth = None if soil.k0 is not None else scene.yield_depth(soil, soil.elastic_k0)
         source = "gravity loading" if highest == soil.elastic_k0 else "yield surface"
         source = "given" if soil.k0 is not None else source
-        rows.append(
-            {"soil": soil.name, "lowest": lowest, "highest": highest, "source": source, "yield_depth": depth}
-        )
+        rows.append({"soil": soil.name, "lowest": lowest, "highest": highest, "source": source, "yield_depth": depth})
     return rows
 
 

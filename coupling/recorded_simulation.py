@@ -19,7 +19,8 @@ from coupling.stop_signals import stop_signals
 
 MOST_TIME_FOR_CHECKPOINTS = 0.02  # share of the wall time that writing them may take
 # Share of the bonded shear that may slip away without a warning: a third raises the largest initial moment of `quick`
-# by 4 %, as much as another mesh does. The built-in scenes (K0 0.429, friction 0.2) would lose 36 % and ask for friction.
+# by 4 %, as much as another mesh does. The built-in scenes (K0 0.429, friction 0.2) would lose 36 %: they ask for
+# friction.
 MOST_UNBORNE = 0.25
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 

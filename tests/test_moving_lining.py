@@ -219,7 +219,7 @@ def test_reactions_follow_the_wall_as_their_derivatives_say(wet):
 
 
 def solver_of(kind, density=DENSITY, **changes):
-    scene = small_scene(lining=kind, **changes).mpm
+    scene = small_scene(lining=kind, **{"initial_contact": "bonded"} | changes).mpm
     tunnel = scene.tunnels[0].model_copy(update={"lining_density": density, "lining_harmonics": 6})
     scene = scene.model_copy(update={"tunnels": (tunnel,)})
     return mpm.Solver(scene, mpm.build_mesh(scene), threads=1)
