@@ -17,6 +17,7 @@ from coupling.scene import as_scene
 if TYPE_CHECKING:
     from coupling.scene import Scene
     from mpm.scene import Scene as MpmScene
+    from mpm.scene import Soil
 
 WARM_UP_STEPS, MEASURED_SPELLS, SECONDS_A_SPELL = 10, 5, 0.3
 # Inflow of grains over that of free discharge under the head at the gate, from runs of case 3 (docs/case-3.md): a rough
@@ -40,12 +41,13 @@ def plan(
     Returns
     -------
     dict
-        scene; features: list of {feature, active, reason}; elements, nodes, points; min_altitude [m]; min_angle
-        [degree]; dt [s]; dt_limit; stop_time [s] or None; stop_inflow_mass [kg/m] or None; steps_at_most (None without
-        a stop time); expected_time [s] and expected_steps: rough where the run stops at an inflow mass; steps are those
-        of the smallest elements, cut to the output interval; expected_point_steps: updates of one point by one step;
-        records; memory_bytes, free_memory_bytes; point_steps_per_second: measured now; expected_seconds: of stepping,
-        without mesh, relaxation and pictures. Steps are counted with the step of the initial state.
+        scene; features: list of {feature, active, reason}; initial_k0: see :func:`initial_k0`; elements, nodes, points;
+        min_altitude [m]; min_angle [degree]; dt [s]; dt_limit; stop_time [s] or None; stop_inflow_mass [kg/m] or None;
+        steps_at_most (None without a stop time); expected_time [s] and expected_steps: rough where the run stops at an
+        inflow mass; steps are those of the smallest elements, cut to the output interval; expected_point_steps: updates
+        of one point by one step; records; memory_bytes, free_memory_bytes; point_steps_per_second: measured now;
+        expected_seconds: of stepping, without mesh, relaxation and pictures. Steps are counted with the step of the
+        initial state.
     """
     import mpm
 
@@ -64,6 +66,7 @@ def plan(
     return {
         "scene": scene.name,
         "features": features(scene, solver.threads, _why_alone(len(solver.mesh.elements), threads)),
+        "initial_k0": initial_k0(scene.mpm),
         "elements": len(solver.mesh.elements),
         "nodes": len(solver.mesh.nodes),
         "points": int(solver.n_points),
@@ -140,7 +143,7 @@ def rough_plan(
     Returns
     -------
     dict
-        Keys of :func:`plan` that need no mesh: scene, features, elements, points, dt [s], stop_time [s],
+        Keys of :func:`plan` that need no mesh: scene, features, initial_k0, elements, points, dt [s], stop_time [s],
         stop_inflow_mass [kg/m], steps_at_most, expected_time [s], expected_steps, records, memory_bytes,
         free_memory_bytes. Elements, points and dt are right within a factor of three where the mesh is regular.
 
@@ -167,6 +170,7 @@ def rough_plan(
     return {
         "scene": scene.name,
         "features": features(scene, threads_used(elements, threads), _why_alone(elements, threads)),
+        "initial_k0": initial_k0(s),
         "elements": math.ceil(elements),
         "points": math.ceil(elements * s.discretisation.points_per_element),
         "dt": dt,
@@ -252,6 +256,11 @@ def features(scene: Scene, threads: int, why_alone: str = "one thread") -> list[
             bool(resting),
             f"coefficient {', '.join(resting)}" if resting else _frictionless(s),
         ),
+        (
+            "K0 of gravity loading",
+            any(soil.k0 is None for soil in s.soils),
+            "; ".join(f"{soil.name}: {initial_k0_text(s, soil)}" for soil in s.soils),
+        ),
         ("slip along the lining before the gate opens", *_initial_slip(s)),
         ("tunnel interior", resolved, inside),
         (
@@ -279,6 +288,40 @@ def features(scene: Scene, threads: int, why_alone: str = "one thread") -> list[
         ),
     )
     return [{"feature": name, "active": bool(active), "reason": reason} for name, active, reason in table]
+
+
+def initial_k0(scene: MpmScene) -> list[dict[str, Any]]:
+    """The K0 that each soil begins with.
+
+    Returns
+    -------
+    list of dict
+        soil: its name; lowest, highest: K0 within the layer [-]; source: "given", "gravity loading" or "yield surface",
+        where gravity loading is brought to the strength of the soil; yield_depth: from where on [m], else None.
+    """
+    rows = []
+    for soil in scene.soils:
+        lowest, highest = scene.lateral_pressure_range(soil)
+        depth = None if soil.k0 is not None else scene.yield_depth(soil, soil.elastic_k0)
+        source = "gravity loading" if highest == soil.elastic_k0 else "yield surface"
+        source = "given" if soil.k0 is not None else source
+        rows.append({"soil": soil.name, "lowest": lowest, "highest": highest, "source": source, "yield_depth": depth})
+    return rows
+
+
+def initial_k0_text(scene: MpmScene, soil: Soil) -> str:
+    """The K0 of a soil and where it comes from, in words."""
+    (row,) = (row for one, row in zip(scene.soils, initial_k0(scene), strict=True) if one is soil)
+    if row["source"] == "given":
+        return f"K0 {row['highest']:.4g}, given"
+    if row["source"] == "gravity loading":
+        return f"K0 {row['highest']:.4g} = nu/(1 - nu), gravity loading"
+    span = "" if row["lowest"] == row["highest"] else f"{row['lowest']:.4g} .. "
+    begin = "" if row["yield_depth"] is None else f" from a depth of {row['yield_depth']:.3g} m"
+    return (
+        f"K0 {span}{row['highest']:.4g}, gravity loading, nu/(1 - nu) = {soil.elastic_k0:.4g} brought to the yield "
+        f"surface{begin}"
+    )
 
 
 def _velocities(s):

@@ -330,7 +330,8 @@ def ring_of(scene: Scene, tunnel: int) -> Ring:
 def ground_at_axis(scene: MpmScene, depth: float) -> dict[str, float]:
     """Soil parameters and effective stresses [Pa] at `depth` [m], for the soil springs of the ring.
 
-    Vertical: :meth:`mpm.Scene.vertical_stress`; horizontal: k0 times that.
+    Vertical: :meth:`mpm.Scene.vertical_stress`; horizontal: the K0 of
+    :meth:`mpm.scene.Soil.lateral_pressure_coefficient` times that.
     """
     vertical = scene.vertical_stress(depth)
     here = [soil for soil in scene.soils if soil.top_depth < depth or soil is scene.soils[0]][-1]
@@ -340,7 +341,7 @@ def ground_at_axis(scene: MpmScene, depth: float) -> dict[str, float]:
         "cohesion": here.cohesion,
         "friction_angle": here.friction_angle,
         "vertical_stress": vertical,
-        "horizontal_stress": here.k0 * vertical,
+        "horizontal_stress": here.lateral_pressure_coefficient(vertical) * vertical,
     }
 
 
@@ -522,8 +523,8 @@ def read_toml_file(path: Path, who: str) -> str:
         raise SceneError(f"{who}: must be UTF-8 text, got: {error}; this is no scene file") from None
 
 
-#: Tables that a scene may leave out although its base has them: `water = "none"` makes it dry.
-OPTIONAL_TABLES = ("water", "gate", "ring")
+#: What a scene may leave out although its base has it: `water = "none"` makes it dry.
+OPTIONAL = ("water", "gate", "ring", "k0")
 NONE = "none"
 
 
@@ -548,7 +549,7 @@ def changed(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     """
     merged = dict(base)
     for key, value in changes.items():
-        if value == NONE and key in OPTIONAL_TABLES:
+        if value == NONE and key in OPTIONAL:
             merged.pop(key, None)
             continue
         here = merged.get(key)

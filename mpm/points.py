@@ -152,10 +152,12 @@ def fill(mesh, scene):
     soil_of_point = soil_of_element[element_of_point].astype(np.int32)
     points[:, X0 : Y0 + 1] = points[:, X : Y + 1]
     vertical, pressure = initial_stress(scene, -points[:, Y])
-    k0 = np.array([s.k0 for s in scene.soils])[soil_of_point]
     points[:, P] = pressure
     points[:, SYY] = -vertical
-    points[:, SXX] = points[:, SZZ] = -k0 * vertical
+    for number, soil in enumerate(scene.soils):
+        here = soil_of_point == number
+        points[here, SXX] = -soil.lateral_pressure_coefficient(vertical[here]) * vertical[here]
+    points[:, SZZ] = points[:, SXX]
     return points, element_of_point, soil_of_point
 
 

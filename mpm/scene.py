@@ -2,7 +2,8 @@
 
 SI units; a string with a unit ("20 kN/m3", "37 deg") is converted. Angles are in degrees, those of
 the lining from the crown, clockwise. The ground surface is y = 0, y points up and x = 0 is the
-middle of the box. Numbers that decide the answer have no default; numerical ones may have one.
+middle of the box. Numbers that decide the answer have no default, but for K0, which follows from gravity loading when
+left out; numerical ones may have one.
 """
 
 import math
@@ -114,7 +115,14 @@ class Water(Part):
 
 
 class Soil(Part):
-    """One soil layer, from `top_depth` down to the next layer or the bottom."""
+    """One soil layer, from `top_depth` down to the next layer or the bottom.
+
+    Parameters
+    ----------
+    k0 : float or None
+        Horizontal over vertical effective stress of the initial state [-]. None: what loading an elastic body by
+        gravity gives, see :meth:`lateral_pressure_coefficient`.
+    """
 
     name: str = Field(max_length=60, pattern=r"^\w[\w .,()+-]*$")  # it is shown in tables, pages and pictures
     top_depth: Length = Field(ge=0)
@@ -129,7 +137,7 @@ class Soil(Part):
     loose_porosity: float
     grain_density: Density = Field(gt=1000, lt=10000)
     hydraulic_conductivity: Velocity | None = None
-    k0: float = Field(gt=0, lt=5)
+    k0: float | None = Field(default=None, gt=0, lt=5)
 
     @field_validator("porosity")
     @classmethod
@@ -173,11 +181,51 @@ class Soil(Part):
         """Lowest and highest k0 that the strength bears under a vertical effective stress [Pa] (Mohr-Coulomb)."""
         if self.model == "elastic" or vertical_stress <= 0:
             return -math.inf, math.inf
-        phi = math.radians(self.friction_angle)
-        cohesive = 2 * self.cohesion * math.cos(phi) / vertical_stress
-        return (1 - math.sin(phi) - cohesive) / (1 + math.sin(phi)), (1 + math.sin(phi) + cohesive) / (
-            1 - math.sin(phi)
-        )
+        return self._borne(self._cohesive / vertical_stress)
+
+    def lateral_pressure_coefficient(self, vertical_stress):
+        """K0 of the initial state under vertical effective stresses: horizontal over vertical effective stress [-].
+
+        `k0` where it is given. Left out, it is that of an elastic body which gravity loads without lateral strain,
+        nu / (1 - nu), raised to the active coefficient where Mohr-Coulomb soil does not bear it: sigma_h is at least
+        (sigma_v (1 - sin(phi)) - 2 c cos(phi)) / (1 + sin(phi)). The passive side is never reached: nu < 0.5.
+
+        Parameters
+        ----------
+        vertical_stress : float or (n,) float64
+            Compression positive [Pa].
+
+        Returns
+        -------
+        float or (n,) float64
+        """
+        if self.k0 is not None:
+            return self.k0
+        elastic = self.elastic_k0
+        if self.model == "elastic":
+            return elastic
+        if self.cohesion == 0:
+            return max(elastic, self._borne(0.0)[0])
+        if isinstance(vertical_stress, int | float):
+            return max(elastic, self.admissible_k0(vertical_stress)[0])
+        import numpy as np  # reading a scene needs none
+
+        under_load = np.where(vertical_stress > 0, vertical_stress, np.nan)
+        return np.fmax(elastic, self._borne(self._cohesive / under_load)[0])
+
+    @property
+    def elastic_k0(self) -> float:
+        """K0 of an elastic body that gravity loads without lateral strain, nu / (1 - nu) [-]."""
+        return self.poissons_ratio / (1 - self.poissons_ratio)
+
+    @property
+    def _cohesive(self):
+        return 2 * self.cohesion * math.cos(math.radians(self.friction_angle))
+
+    def _borne(self, cohesive):
+        """Active and passive coefficient, with 2 c cos(phi) over the vertical stress."""
+        sine = math.sin(math.radians(self.friction_angle))
+        return (1 - sine - cohesive) / (1 + sine), (1 + sine + cohesive) / (1 - sine)
 
 
 def _soil(given) -> str:
@@ -319,7 +367,7 @@ class Numerics(Part):
     courant: float = Field(default=0.8, gt=0, le=1)
     pic_rate: Annotated[float, in_unit("1/s")] = Field(default=1.0, ge=0)
     pressure_filter: float = Field(default=0.4, ge=0, le=1)
-    stress_damping: float = Field(default=0.5, ge=0, le=2)
+    stress_damping: float = Field(default=0.25, ge=0, le=2)
     critical_step: Literal["altitude", "spectral"] = "spectral"
     local_time_stepping: bool = True
     relaxation_tolerance: float = Field(default=1e-5, gt=0, lt=1)
@@ -490,30 +538,52 @@ class Scene(Part):
     def _bottoms(self):
         return [soil.top_depth for soil in self.soils[1:]] + [self.box.depth]
 
+    def _turning_depths(self, soil, top, bottom):
+        """Depths [m] between which the vertical effective stress in a soil's layer is linear, within two depths."""
+        top, bottom = max(top, soil.top_depth), min(bottom, self._bottoms[self.soils.index(soil)])
+        table = top if self.water is None else min(max(self.water.table_depth, top), bottom)
+        return top, table, bottom
+
+    def yield_depth(self, soil: Soil, k0: float) -> float | None:
+        """Depth from which a soil's layer yields under a K0 [m]; None where it bears it throughout."""
+        depths = self._turning_depths(soil, 0.0, math.inf)
+
+        def borne(depth):
+            lowest, highest = soil.admissible_k0(self.vertical_stress(depth))
+            return lowest * (1 - ROUNDING) <= k0 <= highest * (1 + ROUNDING)
+
+        # what cohesion adds fades with the stress, which is linear between these depths
+        shallow, deep = soil.top_depth, max(depths, key=self.vertical_stress)
+        if borne(deep):
+            return None
+        while deep - shallow > 0.01:
+            middle = (shallow + deep) / 2
+            shallow, deep = (middle, deep) if borne(middle) else (shallow, middle)
+        return shallow
+
+    def lateral_pressure_range(self, soil: Soil, top: float = 0.0, bottom: float = math.inf) -> tuple[float, float]:
+        """Lowest and highest K0 of the initial state in a soil's layer, within two depths [m] [-]."""
+        found = [
+            soil.lateral_pressure_coefficient(self.vertical_stress(depth))
+            for depth in self._turning_depths(soil, top, bottom)
+        ]
+        return min(found), max(found)
+
     def _check_k0(self):
         """Refuse a k0 that the soil does not bear in all of its layer: it would yield before the gate opens."""
-        for soil, bottom in zip(self.soils, self._bottoms, strict=True):
-
-            def borne(depth, soil=soil):
-                lowest, highest = soil.admissible_k0(self.vertical_stress(depth))
-                return lowest * (1 - ROUNDING) <= soil.k0 <= highest * (1 + ROUNDING)
-
-            # what cohesion adds fades with the stress, which is linear between these depths
-            table = soil.top_depth if self.water is None else min(max(self.water.table_depth, soil.top_depth), bottom)
-            depth = max(soil.top_depth, table, bottom, key=self.vertical_stress)
-            if borne(depth):
+        for soil in self.soils:
+            yielding = None if soil.k0 is None else self.yield_depth(soil, soil.k0)
+            if yielding is None:
                 continue
-            shallow, deep = soil.top_depth, depth
-            while deep - shallow > 0.01:
-                middle = (shallow + deep) / 2
-                shallow, deep = (middle, deep) if borne(middle) else (shallow, middle)
+            depth = max(self._turning_depths(soil, 0.0, math.inf), key=self.vertical_stress)
             lowest, highest = soil.admissible_k0(self.vertical_stress(depth))
             at_rest = 1 - math.sin(math.radians(soil.friction_angle))
             raise ValueError(
                 f"soil '{soil.name}': k0 must lie in {max(lowest, 0):.3f} .. {highest:.3f}, what friction_angle "
                 f"{soil.friction_angle:g} deg and cohesion {soil.cohesion:g} Pa bear at {depth:g} m, got {soil.k0:g}, "
-                f"which yields from a depth of {shallow:.3g} m; give more strength, or a k0 that it bears: "
-                f"1 - sin(friction_angle) = {at_rest:.3g} where the ground was never loaded more"
+                f"which yields from a depth of {yielding:.3g} m; give more strength, or a k0 that it bears: "
+                f"1 - sin(friction_angle) = {at_rest:.3g} where the ground was never loaded more, or leave k0 out: "
+                "gravity loading within the strength"
             )
 
     @property
@@ -554,15 +624,17 @@ class Scene(Part):
     def bond_friction(self, tunnel: Tunnel) -> float:
         """Friction coefficient that bears the K0 stress on a bonded, held lining [-].
 
-        The largest shear over pressure at a circle, where tan(theta)^2 = 1 / K0: |1 - K0| / (2 sqrt(K0)).
+        The largest shear over pressure at a circle, where tan(theta)^2 = 1 / K0: |1 - K0| / (2 sqrt(K0)). Infinite
+        where nothing presses from the side.
         """
         crown, invert = tunnel.cover, tunnel.cover + tunnel.outer_diameter
         beside = [
-            soil.k0
+            k0
             for soil, bottom in zip(self.soils, self._bottoms, strict=True)
             if soil.top_depth < invert and bottom > crown
+            for k0 in self.lateral_pressure_range(soil, crown, invert)
         ]
-        return max(abs(1 - k0) / (2 * math.sqrt(k0)) for k0 in beside)
+        return max(abs(1 - k0) / (2 * math.sqrt(k0)) if k0 > 0 else math.inf for k0 in beside)
 
     def _check_lining(self, k, tunnel):
         kind = self.lining_of(tunnel)

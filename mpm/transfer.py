@@ -80,7 +80,7 @@ from mpm.variables import (
 # Area spanned by the ways between the points' centres in opposite elements, over that of the quadrilateral, below which
 # they give no slope; 4/9 where they lie in the middle of their elements.
 UNKNOWN_SLOPE = 0.05
-# Volume of points over area from which a quadrilateral begins to count, and counts entirely, as one without free surface.
+# Volume of points over area from which a quadrilateral begins to count as one without free surface, and does so fully.
 HALF_FULL, FULL = 0.5, 0.75
 AHEAD = 16  # points whose rows are on the way into the cache: their order is known, the machine does not guess it
 
@@ -153,7 +153,7 @@ def felt_share(volume, area, fill):
 
 @inline_kernel
 def is_carried(e, start, fill):
-    """Whether an element without points has the stress of the triangle before it, since there is ground around it."""
+    """Whether an element without points has the mean stress of those beside it, since there is ground around it."""
     return fill > 0.0 and start[e] == start[e + 1]
 
 
@@ -585,15 +585,16 @@ def update_kernel(wet, undrained, plastic, tied):
                 fxy += ahead[e] * (fxy - bxy)
                 fp += ahead[e] * (fp - bp)
             add_forces(g1x, g1y, g2x, g2y, fxx, fyy, fxy, fp, a, b, c, sums)
-            beside = (e & ~index(3)) + ((e + index(1)) & index(3))
-            if is_carried(beside, start, contents[e, E_FILL]):
-                share = geometry[beside, 6] / geometry[e, 6]
-                a, b, c = index(rows[beside, 0]), index(rows[beside, 1]), index(rows[beside, 2])
-                touched[a] = touched[b] = touched[c] = 1
-                add_forces(
-                    geometry[beside, 0], geometry[beside, 1], geometry[beside, 2], geometry[beside, 3], share * fxx,
-                    share * fyy, share * fxy, share * fp, a, b, c, sums,
-                )  # fmt: skip
+            for turn in range(1, 4, 2):  # the triangles beside it in its quadrilateral
+                beside = (e & ~index(3)) + ((e + index(turn)) & index(3))
+                if is_carried(beside, start, contents[e, E_FILL]):
+                    share = 0.5 * geometry[beside, 6] / geometry[e, 6]
+                    a, b, c = index(rows[beside, 0]), index(rows[beside, 1]), index(rows[beside, 2])
+                    touched[a] = touched[b] = touched[c] = 1
+                    add_forces(
+                        geometry[beside, 0], geometry[beside, 1], geometry[beside, 2], geometry[beside, 3],
+                        share * fxx, share * fyy, share * fxy, share * fp, a, b, c, sums,
+                    )  # fmt: skip
         clamps[C_SUSPENDED] += n_suspended
         clamps[C_CAVITATED] += n_cavitated
         clamps[C_FLOOR] += n_floor

@@ -124,7 +124,10 @@ def test_wrong_order_of_magnitude_is_warned_of_once_with_what_to_write(changes, 
     [
         (soil(porosity=45), ["fraction, not percent", "write 0.45"]),
         (soil(grain_density=2.65), ["2.65 t/m3", "write 2650"]),
-        (soil(friction_angle=0.436), ["k0 must lie in", "soils[0].friction_angle", "0.436 rad", "write 24.98"]),
+        (
+            soil(friction_angle=0.436, k0=0.577),
+            ["k0 must lie in", "soils[0].friction_angle", "0.436 rad", "write 24.98"],
+        ),
         ({"gate": {"width": 200.0}}, ["200 mm", "write 0.2"]),
     ],
 )

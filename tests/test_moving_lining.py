@@ -147,7 +147,7 @@ def test_formula_of_a_bonded_ring_is_that_of_michell_and_the_beam():
 @pytest.fixture(scope="module")
 def deep_scene():
     scene = coupling.load_scene(
-        "quick", water="none", gate="none", lining="elastic", ring="none", gravity=0.1,
+        "quick", water="none", gate="none", lining="elastic", initial_contact="bonded", ring="none", gravity=0.1,
         box={"width": 80.0, "depth": 80.0}, stop={"time": 1.0}, numerics={"relaxation_tolerance": 0.02},
         discretisation={"element_size": 9.0, "element_size_lining": 0.3, "size_growth": 0.3},
     ).mpm  # fmt: skip
@@ -219,7 +219,7 @@ def test_reactions_follow_the_wall_as_their_derivatives_say(wet):
 
 
 def solver_of(kind, density=DENSITY, **changes):
-    scene = small_scene(lining=kind, **changes).mpm
+    scene = small_scene(lining=kind, **{"initial_contact": "bonded"} | changes).mpm
     tunnel = scene.tunnels[0].model_copy(update={"lining_density": density, "lining_harmonics": 6})
     scene = scene.model_copy(update={"tunnels": (tunnel,)})
     return mpm.Solver(scene, mpm.build_mesh(scene), threads=1)

@@ -67,17 +67,17 @@ def test_balances_while_material_gushes(event):  # noqa: F811
     # At most the scene's Courant number by the state before; the jet may speed up by a tenth within a step.
     courant = Numerics().courant
     assert 0.5 * courant <= last["largest_courant"] < 1.2 * courant
-    # PIC and MUSL take energy, never give any.
-    assert last["transfer_loss"] > 0
+    # stress that counts with area works on other volumes than those of the points: it gives and takes a little
+    assert 1e-3 < errors["energy_error"] < 0.05
 
 
-def test_transfers_take_less_energy_at_shorter_steps():
+def test_transfers_take_the_energy_that_flutter_feeds():
     losses = {}
-    for courant in (0.8, 0.4):
-        scene = quick(stop=Stop(inflow_mass=60.0, time=2.0), numerics=Numerics(courant=courant))
-        losses[courant] = list(simulate(scene))[-1].errors["energy_error"]
-    # PIC takes by the time, the change from old to new velocities by the step: half of the latter is gone
-    assert 0.01 < losses[0.4] < 0.8 * losses[0.8] and losses[0.8] < ERRORS["energy_error"].fair
+    for damping in (Numerics().stress_damping, 0.0):
+        scene = quick(stop=Stop(inflow_mass=60.0, time=2.0), numerics=Numerics(stress_damping=damping))
+        losses[damping] = list(simulate(scene))[-1].errors["energy_error"]
+    with_it, without = losses.values()
+    assert with_it < ERRORS["energy_error"].good and without > 2 * with_it
 
 
 def test_overlap_is_what_a_cell_holds_beyond_its_area():

@@ -55,7 +55,7 @@ def test_initial_theory_is_given_only_where_it_holds(quick_scene):
     theta = np.array([0.0, 90.0])
     theory = numbers.initial_theory(quick_scene, theta)
     vertical = (1 - 0.45) * (2650 - 1000) * 9.81 * np.array([20.0, 23.3])
-    np.testing.assert_allclose(theory["soil_pressure"][0], [vertical[0], 0.577 * vertical[1]])
+    np.testing.assert_allclose(theory["soil_pressure"][0], [vertical[0], 3 / 7 * vertical[1]])
     np.testing.assert_allclose(theory["water_pressure"][0], 9810.0 * np.array([20.0, 23.3]))
     assert numbers.initial_theory(coupling.load_scene("twin-tunnels"), theta) is None
 

@@ -66,7 +66,8 @@ def test_ground_of_the_ring_is_the_soil_at_the_axis():
     scene = coupling.load_scene("case-3")
     buoyant = 0.55 * (2650 - 1000) * 9.81
     assert scene.ring.ground.vertical_stress == pytest.approx(buoyant * 23.3)
-    assert scene.ring.ground.horizontal_stress == pytest.approx(scene.mpm.soils[0].k0 * buoyant * 23.3)
+    # gravity loads an elastic body of nu = 0.3
+    assert scene.ring.ground.horizontal_stress == pytest.approx(0.3 / 0.7 * buoyant * 23.3)
 
 
 def test_ground_given_in_part_keeps_the_rest_of_the_soil_at_the_axis():
@@ -198,7 +199,6 @@ def test_missing_physical_number_is_not_filled_in():
     soil = coupling.load_scene("quick").mpm.soils[0].model_dump()
     for key, message in (
         ("hydraulic_conductivity", "soil 'sand': hydraulic_conductivity must be given where there is water"),
-        ("k0", r"soils\[0\]: k0 missing"),
         ("porosity", r"soils\[0\]: porosity missing"),
     ):
         with pytest.raises(SceneError, match=message):
@@ -362,8 +362,12 @@ def test_k0_that_cohesion_bears_near_the_surface_only_is_refused_with_the_depth(
 def test_built_in_scene_begins_with_a_stress_that_its_soils_bear(name):
     scene = coupling.load_scene(name).mpm
     for soil in scene.soils:
-        lowest, highest = soil.admissible_k0(scene.vertical_stress(scene.box.depth))
-        assert lowest < soil.k0 < highest
+        vertical = scene.vertical_stress(scene.box.depth)
+        lowest, highest = soil.admissible_k0(vertical)
+        # as published: loaded by gravity as an elastic body of nu = 0.3, within the strength of every soil
+        assert soil.k0 is None
+        assert soil.lateral_pressure_coefficient(vertical) == pytest.approx(3 / 7, rel=1e-12)
+        assert lowest < 3 / 7 < highest
 
 
 def test_ring_without_ground_is_stored_as_such():

@@ -23,6 +23,7 @@ from coupling.studies.progress import CaseProgress, study_state
 from coupling.studies.sensitivity import scatter, sensitivity, tornado
 from verification.small_event import small_scene
 
+K0 = 0.3 / (1 - 0.3)  # of gravity loading in the built-in scenes
 TINY = {
     "name": "tiny",
     "scene": "quick",
@@ -36,7 +37,7 @@ def made_up(source, folder, backends, records, threads):
     import tomllib
 
     scene = coupling.make_scene(tomllib.loads(source)).mpm
-    angle, k0 = scene.gate.angle, scene.soils[0].k0
+    angle, k0 = scene.gate.angle, scene.soils[0].lateral_pressure_coefficient(1.0)
     if k0 == 0.6 and angle == 60.0:
         raise RuntimeError("made to fail")
     mass = np.linspace(0, 100, records)
@@ -84,7 +85,7 @@ def test_designs_give_their_combinations():
         {}, {"gate.angle": 60.0}, {"gate.angle": 90.0}, {"soils.0.k0": 0.5}, {"soils.0.k0": 0.6},
     ]  # fmt: skip
     # what a case leaves as it is stands with it all the same; 90 degrees are the base once more
-    assert [c.parameters["soils.0.k0"] for c in cases(alone)] == [0.577, 0.577, 0.5, 0.6]
+    assert [c.parameters["soils.0.k0"] for c in cases(alone)] == [K0, K0, 0.5, 0.6]
     ranges = {
         "gate.angle": {"low": 0, "high": 180},
         "soils.0.hydraulic_conductivity": {"low": 1e-5, "high": 1e-3, "scale": "log"},
@@ -413,9 +414,22 @@ def test_parameters_with_units_are_numbers_of_the_dataset(fast, tmp_path):
     assert 2e10 <= values[:, 1].min() and values[:, 1].max() <= 3e10
 
 
+def test_effect_beside_a_k0_that_varies_with_depth_is_that_of_the_own_parameter():
+    # a K0 at the yield surface is no single number: nan in the base and wherever it is left as it is
+    data = xr.Dataset(
+        coords={
+            "case": np.arange(4), "case_name": ("case", ["as it is", "a 2", "a 3", "k0 0.5"]),
+            "a": ("case", [1.0, 2.0, 3.0, 1.0]), "k0": ("case", [np.nan, np.nan, np.nan, 0.5]),
+        },
+        attrs={"study": json.dumps({"design": "one-at-a-time"})},
+    )  # fmt: skip
+    found = sensitivity(data, xr.DataArray([0.0, 2.0, 4.0, 9.0], dims="case"))
+    assert float(found["effect"].sel(parameter="a")) == 4.0
+
+
 def test_what_a_one_at_a_time_study_repeats_is_no_case_more():
     plan = {"name": "s", "design": "one-at-a-time", "parameters": {
-        "gate.width": [0.15, "200 mm", 0.2], "soils.0.k0": [0.577, 0.5], "water": ["none"]}}  # fmt: skip
+        "gate.width": [0.15, "200 mm", 0.2], "soils.0.k0": ["none", 0.5], "water": ["none"]}}  # fmt: skip
     found = cases(load_study(plan))
     assert [case.name for case in found] == ["as it is", "width 0.15", "k0 0.5", "water none"]
     assert [case.index for case in found] == [0, 1, 2, 3] and len({case.key for case in found}) == 4

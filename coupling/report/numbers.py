@@ -183,7 +183,7 @@ def _in_gate(geometry, theta):
 def initial_theory(scene, theta):
     """Theoretical pressures before the gate opens, or None where the closed form does not hold.
 
-    It holds for one tunnel in one soil that is dry, or saturated up to the surface.
+    It holds for one tunnel in one soil that is dry, or saturated up to the surface, with one K0 beside the tunnel.
 
     scene : coupling.Scene or None;  theta : (n,) float64 [degree];  returns xarray.Dataset or None.
     """
@@ -193,6 +193,9 @@ def initial_theory(scene, theta):
     soil, tunnel = s.soils[0], s.tunnels[0]
     if s.water is not None and s.water.table_depth > 0:
         return None
+    least, largest = s.lateral_pressure_range(soil, tunnel.cover, tunnel.cover + tunnel.outer_diameter)
+    if least < largest:
+        return None
     from structure import theoretical_pressures
 
     density = 0.0 if s.water is None else s.water.density
@@ -200,7 +203,7 @@ def initial_theory(scene, theta):
         outer_diameter=tunnel.outer_diameter,
         cover=tunnel.cover,
         buoyant_unit_weight=(1 - soil.porosity) * (soil.grain_density - density) * s.gravity,
-        coefficient_at_rest=soil.k0,
+        coefficient_at_rest=least,
         water_unit_weight=density * s.gravity,
         theta=theta,
     )

@@ -21,6 +21,8 @@ def left_out(scene):
 
 def facts(scene):
     """Numbers of a scene that an engineer asks for first: list of (what, value as text)."""
+    from coupling.plan import initial_k0_text
+
     s = scene.mpm
     rows = [("box", f"{s.box.width:g} m wide, {s.box.depth:g} m deep")]
     rows.append(("water table", "dry ground" if s.water is None else f"{s.water.table_depth:g} m below the surface"))
@@ -37,7 +39,7 @@ def facts(scene):
         rows.append((
             f"soil '{soil.name}' from {soil.top_depth:g} m",
             f"{soil.model}, E {soil.youngs_modulus / 1e6:g} MPa, ν {soil.poissons_ratio:g}{strength}, "
-            f"porosity {soil.porosity:g} (loose {soil.loose_porosity:g}), K0 {soil.k0:g}{flow}",
+            f"porosity {soil.porosity:g} (loose {soil.loose_porosity:g}), {initial_k0_text(s, soil)}{flow}",
         ))  # fmt: skip
     for k, tunnel in enumerate(s.tunnels):
         name = "tunnel" if len(s.tunnels) == 1 else f"tunnel {k}"

@@ -301,8 +301,11 @@ def check_backends(study: Study):
 
 
 def _value_in(scene, name):
-    """Value of a complete scene at a dotted name; None where it has none."""
+    """Value of a complete scene at a dotted name, a K0 that is left out as it is used; None where it has none."""
     value = scene.mpm.model_dump() | {"ring": None if scene.ring is None else scene.ring.model_dump()}
+    for soil, table in zip(scene.mpm.soils, value["soils"], strict=True):
+        lowest, highest = scene.mpm.lateral_pressure_range(soil)
+        table["k0"] = highest if lowest == highest else None
     for part in name.split("."):
         try:
             value = value[int(part)] if isinstance(value, list | tuple) else value[part]

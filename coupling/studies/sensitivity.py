@@ -57,6 +57,7 @@ def sensitivity(study, quantity):
     rows = {}
     for name, parameter in parameters.items():
         own = known & _own_cases(parameters, name, base) if alone else known
+        own = own & (parameter == parameter)  # cases without a number, nan, say nothing of it
         if len(set(parameter[own].tolist())) > 1:
             rows[name] = _effect(parameter[own], values[own], alone)
     if not rows:
@@ -116,7 +117,11 @@ def _base(study, known):
 
 def _own_cases(parameters, name, base):
     """Cases that leave all other parameters as the base has them."""
-    others = [values == values[base] for other, values in parameters.items() if other != name]
+    others = [
+        (values == values[base]) | ((values != values) & (values[base] != values[base]))  # what has no number is nan
+        for other, values in parameters.items()
+        if other != name
+    ]
     return np.logical_and.reduce(others) if others else np.ones(len(parameters[name]), bool)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 HALF_ARC = 10.0
 #: Mesh size over that of the scene, and number of meshes of that size: their sizes differ by a few per cent, which
 #: shows what the arrangement of elements alone does.
-LEVELS = ((2.0, 3), (2**0.5, 3), (1.0, 2), (0.5**0.5, 1))
+LEVELS = ((2.0, 3), (2**0.5, 3), (1.0, 2), (0.5**0.5, 1), (0.5, 1))
 #: Relative changes of the mesh size among meshes of one level.
 CHANGES = (0.0, 0.03, -0.03)
 
@@ -35,6 +35,7 @@ def refined(scene, factor):
         "element_size": mesh.element_size * factor,
         "element_size_lining": mesh.element_size_lining * factor,
         "element_size_interior": mesh.element_size_interior * factor,
+        "size_growth": mesh.size_growth * factor,
         "elements_across_gate": max(2, round(mesh.elements_across_gate / factor)),
     }
 

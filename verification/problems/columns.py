@@ -139,8 +139,9 @@ def hydrostatics(
     angle = np.radians(lining["theta"])
     depth = tunnel.axis_depth - tunnel.outer_radius * np.cos(angle)
     buoyant = (1 - soil.porosity) * (soil.grain_density - water.density) * scene.gravity
+    k0 = soil.lateral_pressure_coefficient(buoyant * depth)
     exact = {
-        "soil_pressure": buoyant * depth * (np.cos(angle) ** 2 + soil.k0 * np.sin(angle) ** 2),
+        "soil_pressure": buoyant * depth * (np.cos(angle) ** 2 + k0 * np.sin(angle) ** 2),
         "water_pressure": water.density * scene.gravity * depth,
     }
     misses = {name: float(np.abs(lining[name] / value - 1).max()) for name, value in exact.items()}

@@ -27,10 +27,13 @@ def two_phase_wave(
     """
     scene, mesh = column(cells, HEIGHT, conductivity, bulk_modulus, YOUNG, drainage=drainage, **numerics)
     solver = Solver(scene, mesh, threads=1)
+    kappa = math.pi / (2 * HEIGHT)
+    strain = np.cos(kappa * (solver.points[:, Y] + HEIGHT))
+    # water is as stiff as K_w + p: the mean of p where the wave strains it
+    bulk_modulus += float((strain**2 @ solver.points[:, P]) / (strain @ strain))
     speeds, shapes = modes(bulk_modulus)
     shape = np.ones(2) if mode == "together" else shapes[1 if mode == "fast" else 0]
     amplitude = 1e-5 * shape / np.abs(shape).max()
-    kappa = math.pi / (2 * HEIGHT)
     wave = np.sin(kappa * (solver.points[:, Y] + HEIGHT))
     solver.points[:, VSY], solver.points[:, VLY] = amplitude[0] * wave, amplitude[1] * wave
     end = periods * 2 * math.pi / kappa / speeds[0 if mode == "slow" else 1]

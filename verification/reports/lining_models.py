@@ -34,7 +34,7 @@ def pressures(scene, n_times):
         outer_diameter=tunnel.outer_diameter,
         cover=tunnel.cover,
         buoyant_unit_weight=buoyant,
-        coefficient_at_rest=soil.k0,
+        coefficient_at_rest=soil.lateral_pressure_coefficient(buoyant * tunnel.axis_depth),
         water_unit_weight=scene.mpm.water.density * scene.mpm.gravity,
     )
     share = xr.DataArray(np.linspace(0, 0.9, n_times), dims="time")

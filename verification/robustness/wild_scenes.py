@@ -58,6 +58,8 @@ def wild_text(random, base):
     random : random.Random;  base : a good scene's complete text, one key a line.
     """
     lines = base.splitlines()
+    if random.random() < 0.5:  # else K0 is that of gravity loading
+        lines.insert(1 + next(i for i, line in enumerate(lines) if line.startswith("grain_density")), "k0 = 0.5")
     for _ in range(random.choice((0, 1, 1, 1, 2, 3, 6))):
         _change(random, lines)
     text = "\n".join(lines) + "\n"
@@ -72,6 +74,7 @@ RIGHT = (
     ("soils.0.youngs_modulus", "30 MPa", 3e7), ("soils.0.cohesion", "2 kPa", 2e3), ("soils.0.porosity", "44 %", 0.44),
     ("soils.0.hydraulic_conductivity", "8.64 m/day", 1e-4), ("stop.time", "20 ms", 0.02),
     ("discretisation.element_size", "600 cm", 6.0), ("gravity", "981 cm/s^2", 9.81), ("water.density", 1010, 1010.0),
+    ("soils.0.k0", 0.5, 0.5),
 )  # fmt: skip
 #: Dotted names, most of which name nothing.
 DOTTED = (

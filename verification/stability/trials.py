@@ -207,7 +207,9 @@ def _unload(solver, depth):
     vertical, pressure = initial_stress(solver.scene, below)
     solver.points[:, P] = pressure
     solver.points[:, SYY] = -vertical
-    solver.points[:, SXX] = solver.points[:, SZZ] = -solver.scene.soils[0].k0 * vertical
+    solver.points[:, SXX] = solver.points[:, SZZ] = (
+        -solver.scene.soils[0].lateral_pressure_coefficient(vertical) * vertical
+    )
 
 
 def _free(solver):
