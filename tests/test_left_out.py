@@ -95,7 +95,7 @@ def test_dry_scene_has_no_water_pressure_and_less_weight():
 
 def test_scene_file_can_leave_out_the_water_of_its_base(tmp_path):
     file = tmp_path / "dry.toml"
-    file.write_text('base = "quick"\nname = "dry"\nwater = "none"\n')
+    file.write_text('base = "quick"\nname = "dry"\nwater = "none"\n[tunnels.0]\nfriction_coefficient = 0.6\n')
     dry = coupling.load_scene(str(file))
     assert dry.mpm.water is None
     # soil springs see the dry stress at the axis
