@@ -85,7 +85,8 @@ def test_elastic_scene_is_the_limit_of_a_strength_that_is_never_reached():
 
 
 def test_dry_scene_has_no_water_pressure_and_less_weight():
-    case = scene(water=None, stop=mpm.scene.Stop(time=0.004))
+    rough = scene().tunnels[0].model_copy(update={"friction_coefficient": 0.6})  # bears the K0 state
+    case = scene(water=None, stop=mpm.scene.Stop(time=0.004), tunnels=(rough,))
     first, *_, last = mpm.simulate(case)
     assert not first.lining[0]["water_pressure"].any() and not last.lining[0]["water_pressure"].any()
     crown = int(np.argmin(np.abs(first.lining[0]["theta"])))

@@ -85,8 +85,12 @@ def test_warnings_name_what_is_missing_or_off(run, tree, tmp_path):
     assert [text for text in good["warnings"] if "records" not in text and "revision" not in text] == [
         text for text in good["warnings"] if text.startswith("Outside")
     ]
-    # the synthetic pressures are no K0 state, which must be said
-    assert any("against theory" in text for text in good["warnings"])
+    # the synthetic pressures are no K0 state, which must be said where friction bears that state
+    lining = tree["lining"].to_dataset()
+    for friction, verdict in ((0.2, None), (0.5, False)):
+        scene = coupling.load_scene("quick", **{"tunnels.0.friction_coefficient": friction})
+        (soil, _, found), *_ = numbers._against_theory(lining, scene)
+        assert soil.startswith("initial soil pressure against theory") and found is verdict
     short = write_run(tmp_path / "run.nc", times=(0.0, 0.5), models=(), status="interrupted")
     told = " ".join(run_page.collect(short)["warnings"])
     assert "'interrupted'" in told and "No lining model" in told and "Only 2 records" in told
