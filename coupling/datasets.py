@@ -91,7 +91,7 @@ BALANCES = {
     "work_drag": ("J/m", "work of the drag between water and grains since the gate opened"),
     "kinetic_energy_change": ("J/m", "change of the kinetic energy of grains and water since the gate opened"),
     "transfer_loss": ("J/m", "kinetic energy lost between points and nodes since the gate opened"),
-    "flow_energy": ("J/m", "kinetic energy of the flow zone, and what the fall from the gate gave to what came in"),
+    "moving_energy": ("J/m", "kinetic energy, and what the fall from the gate gave to what came in"),
     "material_volume": ("m^2", "area of all material in the mesh"),
     "flow_volume": ("m^2", "area of the material of the flow zone in the mesh"),
     "overlap_volume": ("m^2", "area of material that cells hold beyond their own"),

@@ -54,7 +54,7 @@ ERRORS = {
     "water_lost": Judged("water lost", "{:.1%}", "of what came in", 0.05, 0.15, MORE_POINTS),
     "momentum_error": Judged("momentum", "{:.1%}", "of the flow's", 0.05, 0.15, MORE_POINTS),
     "energy_error": Judged(
-        "energy", "{:.1%}", "of the flow's", 0.10, 0.30, f"{SHORTER_STEPS}, keep numerics.stress_damping above 0"
+        "energy", "{:.1%}", "of what moves", 0.10, 0.30, f"{SHORTER_STEPS}, keep numerics.stress_damping above 0"
     ),
     "flow_overlap": Judged("overlap", "{:.1%}", "of the flow", 0.05, 0.15, MORE_POINTS),
     "grain_mass_error": Judged("grain mass", "{:.0e}", "", 1e-9, 1e-9, BUG),

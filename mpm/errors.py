@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 COMPARED = {
     "water_lost": ("water_missing", ("water_inflow", "flow_water")),
     "momentum_error": ("momentum_departure", ("flow_momentum",)),
-    "energy_error": ("transfer_loss", ("flow_energy",)),
+    "energy_error": ("transfer_loss", ("moving_energy",)),
     "overlap": ("overlap_volume", ("material_volume",)),
     "flow_overlap": ("flow_overlap_volume", ("flow_volume",)),
 }
@@ -35,7 +35,7 @@ def errors(largest: Mapping[str, float]) -> dict[str, float]:
     dict of str to float
         water_lost: water lost or made, over the water that came through the gate's outer face, or, while none came,
         over that of the flow zone; momentum_error: over the momentum of the flow zone; energy_error: kinetic energy
-        that transfers took or gave, over that of the flow zone; overlap, flow_overlap: share of all material, and of
+        that transfers took or gave, over that of all that moves; overlap, flow_overlap: share of all material, and of
         that of the flow zone, that stands where there is no room. 0 where nothing flows.
     """
     shares = {}

@@ -158,9 +158,9 @@ class Measures:
         Returns
         -------
         dict
-            flow_momentum [N s/m]: sum of the sizes of the momenta of grains and water, flow_energy [J/m]: their kinetic
-            energy, and flow_water [kg/m], of the points of the flow zone, those taken out included; flow_energy has in
-            it what the fall from the gate gave those that came through, who lose it where they land; water_inflow
+            flow_momentum [N s/m]: sum of the sizes of the momenta of grains and water, and flow_water [kg/m], of the
+            points of the flow zone, those taken out included; moving_energy [J/m]: kinetic energy of all points, and
+            what the fall from the gate gave those that came through, who lose it where they land; water_inflow
             [kg/m]: water that came through the outer face of the gate, that taken out included; material_volume,
             flow_volume [m2]: volume of all points in the mesh, and of those of the flow zone; overlap_volume,
             flow_overlap_volume [m2]: what the cells hold beyond their area, of all points and of those of the flow
@@ -179,7 +179,7 @@ class Measures:
         flow_beyond = beyond * np.divide(flowing, in_cell, out=np.zeros_like(area), where=in_cell > 0)
         amounts = {
             "flow_momentum": momenta[flows].sum(),
-            "flow_energy": self._kinetic_energies(wet)[flows].sum() + self._energy_of_the_fall(wet),
+            "moving_energy": self._kinetic_energies(wet).sum() + self._energy_of_the_fall(wet),
             "flow_water": held[flows].sum(),
             "water_inflow": held[self._past_the_gate()].sum(),
             "material_volume": in_cell.sum(),

@@ -38,7 +38,7 @@ def test_fall_turns_the_work_of_gravity_into_motion():
     assert abs(balances["water_missing"]) < 1e-12 * solver.initial["water"]
     # all of it fell by 0.2 m, more than the 50 mm of the flow zone, as one block
     assert balances["flow_momentum"] == pytest.approx(received, rel=1e-12)
-    assert balances["flow_energy"] == pytest.approx(balances["work_gravity"], rel=1e-12)
+    assert balances["moving_energy"] == pytest.approx(balances["work_gravity"], rel=1e-12)
     assert balances["flow_water"] == pytest.approx(solver.initial["water"], rel=1e-12)
     assert balances["overlap_volume"] < 1e-9 and solver.tip_fraction() == pytest.approx(1.0)
 
