@@ -1,9 +1,11 @@
 """What moves the inflow of case 3: numerical choices, which must not, beside properties of the ground, which must.
 
-    uv run python -m verification.reports.inflow_sensitivity    # some ten minutes; writes docs/inflow-sensitivity.*
+    uv run python -m verification.reports.inflow_sensitivity           # some ten minutes; docs/inflow-sensitivity.*
+    uv run python -m verification.reports.inflow_sensitivity case-3    # half an hour; docs/case-3-sensitivity.*
 
-Scene `quick`, one thing changed at a time, until 300 kg/m: the times of 100, 200 and 300 kg/m, the ring's largest and
-least moment there, the pressures, and how rough and noisy the soil pressure on the ring is.
+Scene `quick` until 300 kg/m, or `case-3` until 1000 kg/m, one thing changed at a time: the times of three inflow
+masses, the extremes of the ring's forces at the last, the pressures, and how rough and noisy the soil pressure on the
+ring is; of `case-3` also the values at mesh size zero with error bars.
 """
 
 import json
@@ -20,9 +22,10 @@ import coupling
 import mpm
 from coupling.datasets import cell_centres, cell_mean_weights
 from coupling.run import respond
+from verification.accuracy.orders import extrapolate
 from verification.pages import DOCS, made_by, need_docs
 
-MARKS = (100.0, 200.0, 300.0)  # kg/m
+MARKS = {"quick": (100.0, 200.0, 300.0), "case-3": (100.0, 300.0, 1000.0)}  # kg/m
 INTERVAL = 0.005  # between looks at the inflow [s]
 AVERAGED = 0.9  # of the last mark: pressures are means from there on
 BESIDE_GATE = 25.0  # degrees that roughness and noise leave out
@@ -55,6 +58,25 @@ NUMERICS = (
     ("K0 changed by a thousandth", {"soil": {"k0": K0 * 1.001}}),
     ("conductivity changed by a thousandth", {"soil": {"hydraulic_conductivity": 1.001e-4}}),
 )
+CASE_3 = (
+    ("as the scene has it", {}),
+    *((f"all elements {size:g} times as large", {"size": size}) for size in (2.0, 1.4, 0.7, 0.5)),
+    ("half the elements across the gate", {"across": 0.5}),
+    ("twice the elements across the gate", {"across": 2.0}),
+    ("12 points an element everywhere", {"discretisation": {"points_per_element": 12}}),
+    ("3 points an element everywhere", {"discretisation": {"points_per_element_gate": 3}}),
+    ("25 points an element before the gate", {"discretisation": {"points_per_element_gate": 25}}),
+    ("pressure_filter 0 (off)", {"numerics": {"pressure_filter": 0.0}}),
+    ("pressure_filter 0.8", {"numerics": {"pressure_filter": 0.8}}),
+    ("stress_damping 0 (off)", {"numerics": {"stress_damping": 0.0}}),
+    ("stress_damping 1", {"numerics": {"stress_damping": 1.0}}),
+    ("pic_rate 0 (pure FLIP)", {"numerics": {"pic_rate": 0.0}}),
+    ("pic_rate 10 /s", {"numerics": {"pic_rate": 10.0}}),
+    ("courant 0.4", {"numerics": {"courant": 0.4}}),
+    ("slipping corners of the gate", {"gate": {"corners": "slipping"}}),
+    ("sink instead of the interior", {"interior": "sink"}),
+    ("water four times as stiff", {"water": {"bulk_modulus": 3.2e8}}),
+)
 PHYSICS = (
     *((f"conductivity {k:g} m/s", {"soil": {"hydraulic_conductivity": k}}) for k in (1e-6, 1e-5, 1e-3, 1e-2, 1e-1)),
     ("water as stiff as it is, 2.2 GPa", {"water": {"bulk_modulus": 2.2e9}}),
@@ -69,9 +91,9 @@ PHYSICS = (
 )
 
 
-def varied(changes):
-    """Scene `quick` with these changes."""
-    scene = coupling.load_scene("quick")
+def varied(name, changes):
+    """A built-in scene with these changes."""
+    scene = coupling.load_scene(name)
     ground = scene.mpm.model_dump()
     ground["soils"] = [ground["soils"][0] | changes.get("soil", {})]
     for part in ("numerics", "water", "gate", "discretisation"):
@@ -85,14 +107,14 @@ def varied(changes):
     return scene.model_copy(update={"mpm": mpm.Scene.model_validate(ground)})
 
 
-def measure(what, changes):
-    """One row of the table: times [s], moments [N m/m], pressures [Pa], roughness [-], cost."""
-    scene = varied(changes)
+def measure(name, what, changes):
+    """One row of the table: times [s], forces [N/m], moments [N m/m], pressures [Pa], roughness [-], cost."""
+    scene = varied(name, changes)
     simulation = mpm.Simulation(scene.mpm, threads=1)
     simulation.begin()
     solver = simulation.solver
     solver.impulse[:] = 0.0
-    begin, since, inflow, marks, times = clock.process_time(), 0.0, 0.0, list(MARKS), []
+    begin, since, inflow, marks, times = clock.process_time(), 0.0, 0.0, list(MARKS[name]), []
     while marks and solver.time < PATIENCE:
         end = solver.time + INTERVAL
         before, time = inflow, solver.time
@@ -101,18 +123,18 @@ def measure(what, changes):
         inflow = solver.inflow_mass()
         while marks and inflow >= marks[0]:
             times.append(time + (solver.time - time) * (marks.pop(0) - before) / (inflow - before))
-        if inflow < AVERAGED * MARKS[-1]:
+        if inflow < AVERAGED * MARKS[name][-1]:
             solver.impulse[:], since = 0.0, solver.time
     lining = solver.lining_pressures(max(solver.time - since, INTERVAL))[0]
     weights, theta = cell_mean_weights(lining["theta"]), cell_centres()
     pressures = xr.Dataset(
         {
-            name: (("time", "theta"), (weights @ lining[name])[None], {"units": "Pa"})
-            for name in ("soil_pressure", "water_pressure", "soil_shear")
+            key: (("time", "theta"), (weights @ lining[key])[None], {"units": "Pa"})
+            for key in ("soil_pressure", "water_pressure", "soil_shear")
         },
         {"time": ("time", [solver.time], {"units": "s"}), "theta": ("theta", theta, {"units": "degree"})},
     )
-    moment = respond(scene, pressures).bending_moment.values
+    forces = respond(scene, pressures)
     gate = scene.mpm.gate.angle
     soil, water = pressures.soil_pressure.values[0], pressures.water_pressure.values[0]
     mean, parabola = (savgol_filter(soil, 2 * BESIDE + 1, order, mode="wrap") for order in (0, 2))
@@ -121,8 +143,12 @@ def measure(what, changes):
         "what": what,
         "times": times + [None] * len(marks),
         "inflow": inflow,
-        "moment_max": float(moment.max()),
-        "moment_min": float(moment.min()),
+        "moment_max": float(forces.bending_moment.max()),
+        "moment_min": float(forces.bending_moment.min()),
+        "axial_max": float(forces.axial_force.max()),
+        "axial_min": float(forces.axial_force.min()),
+        "shear_max": float(forces.shear_force.max()),
+        "shear_min": float(forces.shear_force.min()),
         "soil_crown": float(mean[0]),
         "soil_invert": float(mean[180]),
         "soil_beside_gate": float(soil[int(gate) + 10]),
@@ -138,7 +164,9 @@ def measure(what, changes):
 
 
 COLUMNS = (
-    ("M max / min kN m", lambda r: f"{r['moment_max'] / 1e3:.0f} / {r['moment_min'] / 1e3:.0f}"),
+    ("N max / min kN/m", lambda r: f"{r['axial_max'] / 1e3:.0f} / {r['axial_min'] / 1e3:.0f}"),
+    ("Q max / min kN/m", lambda r: f"{r['shear_max'] / 1e3:.0f} / {r['shear_min'] / 1e3:.0f}"),
+    ("M max / min kN m/m", lambda r: f"{r['moment_max'] / 1e3:.0f} / {r['moment_min'] / 1e3:.0f}"),
     ("soil crown / invert / 10 deg kPa", lambda r: " / ".join(
         f"{r[k] / 1e3:.0f}" for k in ("soil_crown", "soil_invert", "soil_beside_gate"))),
     ("water crown / 10 deg kPa", lambda r: f"{r['water_crown'] / 1e3:.0f} / {r['water_beside_gate'] / 1e3:.0f}"),
@@ -148,9 +176,19 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def table(rows):
+#: What is told of the spread, and extrapolated: key of a row, label, unit, factor to it.
+TOLD = (
+    ("axial_max", "largest axial force", "kN/m", 1e-3), ("shear_max", "largest shear force", "kN/m", 1e-3),
+    ("moment_max", "largest moment", "kN m/m", 1e-3), ("moment_min", "least moment", "kN m/m", 1e-3),
+    ("soil_crown", "soil pressure at the crown", "kPa", 1e-3),
+    ("soil_invert", "soil pressure at the invert", "kPa", 1e-3),
+    ("soil_beside_gate", "soil pressure 10 degrees beside the gate", "kPa", 1e-3),
+)  # fmt: skip
+
+
+def table(name, rows):
     """Markdown lines of the rows."""
-    head = ["changed", *(f"{m:.0f} kg/m at s" for m in MARKS), *(name for name, _ in COLUMNS)]
+    head = ["changed", *(f"{m:.0f} kg/m at s" for m in MARKS[name]), *(label for label, _ in COLUMNS)]
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for row in rows:
         shown = [f"{t:.3f}" if t is not None else f"> {PATIENCE:g}" for t in row["times"]]
@@ -158,56 +196,94 @@ def table(rows):
     return lines
 
 
-def spread(rows):
+def quantities(name):
+    """What is compared between rows: list of (label, unit, function of a row to its value or None)."""
+    times = [(f"time to {mark:.0f} kg/m", "s", lambda row, k=k: row["times"][k]) for k, mark in enumerate(MARKS[name])]
+    return times + [(label, unit, lambda row, k=key, f=f: row[k] * f) for key, label, unit, f in TOLD]
+
+
+def spread(name, rows):
     """One sentence: how far the numerical choices move what is reported, from the first row."""
-    first, sentences = rows[0], []
-    for k, mark in enumerate(MARKS):
-        values = [row["times"][k] for row in rows if row["times"][k] is not None]
-        low, high = min(values) / first["times"][k] - 1, max(values) / first["times"][k] - 1
-        sentences.append(f"time to {mark:.0f} kg/m {100 * low:+.0f} .. {100 * high:+.0f} %")
-    for name, label in (("moment_max", "largest moment"), ("moment_min", "least moment")):
-        values = [row[name] / first[name] - 1 for row in rows]
-        sentences.append(f"{label} {100 * min(values):+.1f} .. {100 * max(values):+.1f} %")
+    sentences = []
+    for label, _, value in quantities(name):
+        moved = [value(row) / value(rows[0]) - 1 for row in rows if value(row) is not None]
+        sentences.append(f"{label} {100 * min(moved):+.1f} .. {100 * max(moved):+.1f} %")
     return "From the first row: " + ", ".join(sentences) + "."
 
 
+def at_size_zero(name, rows, choices):
+    """Markdown lines: values at mesh size zero, their error bars by mesh, and by all other choices, of `choices`.
+
+    Straight line through the four finest of the meshes of which all sizes change; its bar as of
+    `verification.accuracy.orders.extrapolate`. The other bar is the largest change that another choice makes.
+    """
+    sizes = [(changes.get("size", 1.0), row) for row, (_, changes) in zip(rows, choices, strict=True)
+             if set(changes) <= {"size"}]  # fmt: skip
+    sizes = sorted(sizes, key=lambda pair: pair[0])[:4]
+    others = [row for row, (_, changes) in zip(rows, choices, strict=True) if not set(changes) <= {"size"}]
+    lines = [
+        "| | scene | size zero | bar: mesh | bar: all other choices | together % of the scene's |",
+        "|" + "---|" * 6,
+    ]
+    for label, unit, value in quantities(name):
+        zero = extrapolate([size for size, _ in sizes], [value(row) for _, row in sizes])
+        here = value(rows[0])
+        bar = max(abs(value(row) - here) for row in others)
+        together = 100 * np.hypot(zero.error_bar, bar) / abs(here)
+        lines.append(
+            f"| {label} [{unit}] | {here:.4g} | {zero.value:.4g} | {zero.error_bar:.2g} | {bar:.2g} | {together:.0f} |"
+        )
+    return lines
+
+
+def introduction(name):
+    """What was computed, how, and what the columns mean."""
+    command = "uv run python -m verification.reports.inflow_sensitivity" + (" case-3" if name == "case-3" else "")
+    return (
+        f"{made_by(command)}. Scene `{name}` with K0 = nu/(1 - nu), hydraulic conductivity 1e-4 m/s, until "
+        f"{MARKS[name][-1]:.0f} kg/m; pressures and forces are means over the last tenth of it; roughness and noise: "
+        f"rms of the soil pressure on the ring off its mean, and off the parabola, over {BESIDE} degrees to both sides, "
+        f"beyond {BESIDE_GATE:.0f} degrees from the gate; where slip lines meet the ring the pressure has kinks that "
+        "the mean leaves out and the parabola follows."
+    )
+
+
+def write(file, page, data):
+    """Write a page and its data into the docs."""
+    (DOCS / f"{file}.md").write_text("\n".join(page) + "\n", encoding="utf-8")
+    (DOCS / f"{file}.json").write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+
+
 def main():
-    parts = {"numerics": NUMERICS, "physics": PHYSICS}
-    chosen = [parts[name] for name in sys.argv[1:] or parts]
+    name = sys.argv[1] if len(sys.argv) > 1 else "quick"
+    parts = {"numerics": NUMERICS, "physics": PHYSICS} if name == "quick" else {"numerics": CASE_3}
     need_docs()
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        jobs = [[pool.submit(measure, *row) for row in part] for part in chosen]
-        rows = []
-        for part in jobs:
-            rows.append([])
-            for job in part:
-                rows[-1].append(job.result())
-                print(rows[-1][-1], flush=True)
-    if len(rows) < 2:
-        return
-    numerics, physics = rows
+        jobs = {part: [pool.submit(measure, name, *row) for row in choices] for part, choices in parts.items()}
+        rows = {}
+        for part, its in jobs.items():
+            rows[part] = []
+            for job in its:
+                rows[part].append(job.result())
+                print(rows[part][-1], flush=True)
+    numerics = rows["numerics"]
     page = [
-        "# What moves the inflow, and what must not",
         "",
-        f"{made_by('uv run python -m verification.reports.inflow_sensitivity')}. Scene `quick` with K0 = nu/(1 - nu), "
-        f"hydraulic conductivity 1e-4 m/s, until {MARKS[-1]:.0f} kg/m; pressures are means over the last tenth of it; "
-        f"roughness and noise: rms of the soil pressure on the ring off its mean, and off the parabola, over {BESIDE} "
-        f"degrees to both sides, beyond {BESIDE_GATE:.0f} degrees from the gate; where slip lines meet the ring the "
-        "pressure has kinks that the mean leaves out and the parabola follows.",
+        introduction(name),
         "",
         "## Numerical choices",
         "",
-        *table(numerics),
+        *table(name, numerics),
         "",
-        spread(numerics),
+        spread(name, numerics),
         "",
-        "## The ground",
-        "",
-        *table([numerics[0], *physics]),
     ]
-    (DOCS / "inflow-sensitivity.md").write_text("\n".join(page) + "\n", encoding="utf-8")
-    stored = json.dumps({"numerics": numerics, "physics": physics}, indent=1)
-    (DOCS / "inflow-sensitivity.json").write_text(stored + "\n", encoding="utf-8")
+    if name == "quick":
+        page += ["## The ground", "", *table(name, [numerics[0], *rows["physics"]])]
+        write("inflow-sensitivity", ["# What moves the inflow, and what must not", *page], rows)
+    else:
+        page += ["## At mesh size zero", "", *at_size_zero(name, numerics, CASE_3)]
+        write("case-3-sensitivity", ["# Case 3: how wrong its numbers may be", *page], rows)
 
 
 if __name__ == "__main__":
