@@ -229,10 +229,9 @@ def at_size_zero(name, rows, choices):
         zero = extrapolate([size for size, _ in sizes], [value(row) for _, row in sizes])
         here = value(rows[0])
         bar = max(abs(value(row) - here) for row in others)
-        together = 100 * np.hypot(zero.error_bar, bar) / abs(here)
-        lines.append(
-            f"| {label} [{unit}] | {here:.4g} | {zero.value:.4g} | {zero.error_bar:.2g} | {bar:.2g} | {together:.0f} |"
-        )
+        together = 100 * np.hypot(zero.error, bar) / abs(here)
+        numbers = f"{here:.4g} | {zero.value:.4g} | {zero.error:.2g} | {bar:.2g} | {together:.0f}"
+        lines.append(f"| {label} [{unit}] | {numbers} |")
     return lines
 
 
