@@ -241,7 +241,7 @@ def introduction(name):
     return (
         f"{made_by(command)}. Scene `{name}` with K0 = nu/(1 - nu), hydraulic conductivity 1e-4 m/s, until "
         f"{MARKS[name][-1]:.0f} kg/m; pressures and forces are means over the last tenth of it; roughness and noise: "
-        f"rms of the soil pressure on the ring off its mean, and off the parabola, over {BESIDE} degrees to both sides, "
+        f"rms of the soil pressure on the ring off its mean, and off the parabola, over {BESIDE} degrees each side, "
         f"beyond {BESIDE_GATE:.0f} degrees from the gate; where slip lines meet the ring the pressure has kinks that "
         "the mean leaves out and the parabola follows."
     )
