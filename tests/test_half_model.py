@@ -67,8 +67,9 @@ def test_event_of_the_half_is_that_of_the_whole(angle, dry):
     for solver in (half, whole):
         solver.open_gate()
         solver.impulse[:] = 0.0
-        for _ in range(400):
-            solver.step(1.5e-4)  # below the critical step, whose estimate is another one for the half
+        for _ in range(600):
+            solver.step(1e-4)  # below the critical step, whose estimate is another one for the half
+    assert half.step_count == whole.step_count == 600
     assert half.time == pytest.approx(whole.time, rel=EVENT)
     same_pressures(half, whole, half.time, EVENT)
     mine, theirs = half.measures(), whole.measures()
@@ -104,8 +105,8 @@ def test_inflow_is_that_of_the_whole_and_stops_the_run():
     *_, last = mpm.simulate(case, threads=1)
     whole = case.model_copy(update={"symmetry": "whole"})
     *_, other = mpm.simulate(whole, mpm.build_mesh(case), threads=1)
-    assert last.inflow_mass >= 20.0 and last.steps == other.steps
-    # the masses of single points decide, and the flow has multiplied the last bits
+    # the masses of single points decide, and the flow has multiplied the last bits, those of the time step as well
+    assert last.inflow_mass >= 20.0 and abs(last.steps - other.steps) <= 1
     assert last.inflow_mass == pytest.approx(other.inflow_mass, rel=1e-3)
     assert last.grain_mass == pytest.approx(other.grain_mass, rel=1e-12)
 
