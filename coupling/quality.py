@@ -48,13 +48,18 @@ MORE_POINTS = "raise discretisation.points_per_element_gate"
 SHORTER_STEPS = "lower numerics.courant"
 BUG = "this is round-off where the program is right: please report it with scene.toml and run.log"
 #: Name in :func:`quality`: how it is judged. A speed that is wrong by 5 % changes inflow and forces by less than
-#: another mesh does, one that is wrong by 15 % by more; energy is its square. Water that is lost no longer presses, and
-#: overlap makes what flows as much too dense: the same shares of the flow.
+#: another mesh does, one that is wrong by 15 % by more; energy is its square, but what lands loses all of it one way or
+#: the other. Water that is lost no longer presses, and overlap makes what flows as much too dense: the same shares.
 ERRORS = {
     "water_lost": Judged("water lost", "{:.1%}", "of what came in", 0.05, 0.15, MORE_POINTS),
     "momentum_error": Judged("momentum", "{:.1%}", "of the flow's", 0.05, 0.15, MORE_POINTS),
     "energy_error": Judged(
-        "energy", "{:.1%}", "of what moves", 0.10, 0.30, f"{SHORTER_STEPS}, keep numerics.stress_damping above 0"
+        "energy",
+        "{:.1%}",
+        "of what moves",
+        0.10,
+        0.50,
+        "keep numerics.stress_damping above 0; what lands loses energy as well, interior = 'sink' leaves it out",
     ),
     "flow_overlap": Judged("overlap", "{:.1%}", "of the flow", 0.05, 0.15, MORE_POINTS),
     "grain_mass_error": Judged("grain mass", "{:.0e}", "", 1e-9, 1e-9, BUG),
