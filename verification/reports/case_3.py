@@ -38,8 +38,8 @@ BESIDE = (
     "Beside the published study (Xie, Zhang & Zhou). Its permeability and joint angles are not stated and its gate",
     "is one element wide. Ours lets soil in many times faster. At equal inflow mass shear and negative moments grow",
     "as published or a fifth more, positive moments twice as much, more than the error of our numbers",
-    "([error bars](case-3-sensitivity.md)). Permeability, dilatancy and the stiffness of the water are the suspects; none",
-    "is tuned.",
+    "([error bars](case-3-sensitivity.md)). Permeability, dilatancy and the stiffness of the water are the suspects;",
+    "none is tuned.",
     "",
 )
 
