@@ -40,7 +40,7 @@ def wild_pressures(random):
     """
     draw, kind = np.random.default_rng(random.getrandbits(64)), random.choice(KINDS)
     count, records = random.choice((8, 9, 12, 36, 72, 360)), random.choice((1, 2, 5))
-    moved = random.choice((0.0, 0.0, 0.2)) * draw.uniform(-1, 1, count)
+    moved = random.choice((0.0, 0.0, 0.15)) * draw.uniform(-1, 1, count)  # of eight none 60 degrees from the next
     theta = (np.arange(count) + moved) * 360 / count
     theta %= 360
     order = np.argsort(theta)
@@ -103,7 +103,8 @@ def _mistaken(random, draw, kind, true):
     elif kind == "no time":
         given = given.drop_vars("time")
     elif kind == "more than a turn":
-        given = given.assign_coords(theta=given["theta"] * random.choice((2.0, 10 / 9)) + 0.1)
+        factors = [factor for factor in (2.0, 10 / 9) if factor * np.ptp(given["theta"].values) > 360.0]
+        given = given.assign_coords(theta=given["theta"] * random.choice(factors) + 0.1)
     return given
 
 
