@@ -562,7 +562,7 @@ class Scene(Part):
         return shallow
 
     def lateral_pressure_range(self, soil: Soil, top: float = 0.0, bottom: float = math.inf) -> tuple[float, float]:
-        """Lowest and highest K0 of the initial state in a soil's layer, within two depths [m] [-]."""
+        """Lowest and highest K0 [-] of the initial state in a soil's layer, between two depths [m]."""
         found = [
             soil.lateral_pressure_coefficient(self.vertical_stress(depth))
             for depth in self._turning_depths(soil, top, bottom)
