@@ -170,6 +170,7 @@ class Measures:
         held, element = self._held_water(wet), self.element_of_point
         grains, water = (np.hypot(self.points[:, x], self.points[:, y]) for x, y in ((VSX, VSY), (VLX, VLY)))
         momenta = self.points[:, MASS] * grains + wet * water
+        past = self._past_the_gate()
         inside, flows_inside = element >= 0, flows & (element >= 0)
         cell = element // 4
         area = self.geometry[:, 6].reshape(-1, 4).sum(axis=1)
@@ -179,9 +180,9 @@ class Measures:
         flow_beyond = beyond * np.divide(flowing, in_cell, out=np.zeros_like(area), where=in_cell > 0)
         amounts = {
             "flow_momentum": momenta[flows].sum(),
-            "moving_energy": self._kinetic_energies(wet).sum() + self._energy_of_the_fall(wet),
+            "moving_energy": self._kinetic_energies(wet).sum() + self._energy_of_the_fall(past, wet),
             "flow_water": held[flows].sum(),
-            "water_inflow": held[self._past_the_gate()].sum(),
+            "water_inflow": held[past].sum(),
             "material_volume": in_cell.sum(),
             "flow_volume": flowing.sum(),
             "overlap_volume": beyond.sum(),
@@ -189,13 +190,12 @@ class Measures:
         }
         return {name: self.copies * float(amount) for name, amount in amounts.items()}
 
-    def _energy_of_the_fall(self, wet):
-        """What gravity has done on grains and water below the gate that came through it [J/m]."""
+    def _energy_of_the_fall(self, past, wet):
+        """What gravity has done on grains and water below the gate, of points past it [J/m]."""
         if self.scene.gate is None:
             return 0.0
         tunnel = self.scene.tunnels[self.scene.gate.tunnel]
         gate = tunnel.outer_radius * np.cos(np.radians(self.scene.gate.angle)) - tunnel.axis_depth
-        past = self._past_the_gate()
         fall = np.maximum(gate - self.points[past, Y], 0.0)
         return np.sum((self.points[past, MASS] + wet[past]) * fall) * self.scene.gravity
 

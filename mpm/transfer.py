@@ -472,6 +472,7 @@ def update_kernel(wet, undrained, plastic, tied):
                     nodes[c, V_LY],
                 )  # fmt: skip
                 expansion_liquid = dt * (liquid_xx + liquid_yy)
+            shrunk = 1.0 / (1.0 + expansion)
             mean = expansion * third
             equivalent = np.sqrt(2.0 * third * ((exx - mean) ** 2 + (eyy - mean) ** 2 + mean * mean + 2.0 * exy * exy))
             full = contents[e, E_VOLUME] >= geometry[e, 6]
@@ -494,7 +495,7 @@ def update_kernel(wet, undrained, plastic, tied):
                         n_suspended += 1
                     else:
                         void = n
-                        n = 1.0 - (1.0 - n) / (1.0 + expansion)
+                        n = 1.0 - (1.0 - n) * shrunk
                         if n < POROSITY_FLOOR:
                             n = POROSITY_FLOOR
                             n_floor += 1
@@ -504,7 +505,7 @@ def update_kernel(wet, undrained, plastic, tied):
                         if wet:
                             # the water held, n V (1 + p / K_w), changes by n V (div v_s - div v_l) dt
                             p = void * (p - bulk_liquid * expansion_liquid) - (1.0 - void) * bulk_liquid * expansion
-                            p /= n * (1.0 + expansion)
+                            p *= shrunk / n
                             points[i, P] = p
                             if p < 0.0:
                                 n_cavitated += 1

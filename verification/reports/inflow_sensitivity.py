@@ -229,15 +229,15 @@ def at_size_zero(name, rows, choices):
         if not set(changes) <= {"size", "water"} and what not in COARSER
     ]
     lines = [
-        "| | scene | size zero | bar: mesh | bar: all other choices | together % of the scene's |",
-        "|" + "---|" * 6,
+        "| | scene | size zero | bar: mesh | bar: all other choices | together % | scene less size zero % |",
+        "|" + "---|" * 7,
     ]
     for label, unit, value in quantities(name):
         zero = extrapolate([size for size, _ in sizes], [value(row) for _, row in sizes])
         here = value(rows[0])
         bar = max(abs(value(row) - here) for row in others)
-        together = 100 * np.hypot(zero.error, bar) / abs(here)
-        numbers = f"{here:.4g} | {zero.value:.4g} | {zero.error:.2g} | {bar:.2g} | {together:.0f}"
+        together, above = (100 * part / abs(here) for part in (np.hypot(zero.error, bar), here - zero.value))
+        numbers = f"{here:.4g} | {zero.value:.4g} | {zero.error:.2g} | {bar:.2g} | {together:.0f} | {above:+.0f}"
         lines.append(f"| {label} [{unit}] | {numbers} |")
     return lines
 
