@@ -119,6 +119,10 @@ class Soil(Part):
 
     Parameters
     ----------
+    relaxation_time : float
+        In which stress beyond the strength falls by 1/e [s] (Duvaut & Lions 1972); 0: at once, perfectly plastic. Where
+        soil shears at a rate e' it bears 2 G e' times this time more, and slip lines get a width. Not in the drained
+        initial state.
     k0 : float or None
         Horizontal over vertical effective stress of the initial state [-]. None: what loading an elastic body by
         gravity gives, see :meth:`lateral_pressure_coefficient`.
@@ -135,6 +139,7 @@ class Soil(Part):
     tensile_strength: Pressure = Field(default=0.0, ge=0, le=1e8)
     porosity: float
     loose_porosity: float
+    relaxation_time: Time = Field(default=0.0, ge=0, le=1)
     grain_density: Density = Field(gt=1000, lt=10000)
     hydraulic_conductivity: Velocity | None = None
     k0: float | None = Field(default=None, gt=0, lt=5)

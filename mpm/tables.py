@@ -8,7 +8,7 @@ from mpm.variables import MODEL_ELASTIC, MODEL_MOHR_COULOMB, SOIL_WIDTH
 
 
 def soil_table(scene):
-    """Parameters of the soils as the kernels read them: (n_soils, 12) float64."""
+    """Parameters of the soils as the kernels read them: (n_soils, 13) float64."""
     table = np.zeros((len(scene.soils), SOIL_WIDTH))
     for row, soil in zip(table, scene.soils, strict=True):
         shear = soil.youngs_modulus / (2 * (1 + soil.poissons_ratio))
@@ -28,6 +28,7 @@ def soil_table(scene):
             soil.loose_porosity,
             scene.gravity / soil.hydraulic_conductivity if scene.is_two_phase else 0.0,
             soil.grain_density,
+            soil.relaxation_time,
         )
     return table
 

@@ -51,6 +51,7 @@ from mpm.variables import (
     S_LAMBDA,
     S_LOOSE,
     S_MODEL,
+    S_RELAX,
     S_RHO_S,
     S_SIN,
     S_SIN_DIL,
@@ -107,8 +108,8 @@ def fill_of_cell(first, geometry, contents):
     Where ground is, the mean stress of each triangle counts with the triangle's area, not with the volume of the points
     that are in it by chance: of three points one that crosses an edge takes a third of the force along, and the ground
     answers with stresses that differ by as much. At a free surface the points of the quadrilateral count, evenly over
-    its triangles; from half full to three quarters the one passes into the other. One triangle may be empty
-    (`is_carried`), of two nothing is known.
+    its triangles; from half full to three quarters the one passes into the other. Empty triangles have the mean stress
+    of the others.
 
     first : int
         First element of the quadrilateral.
@@ -117,13 +118,9 @@ def fill_of_cell(first, geometry, contents):
     method for geomechanical problems, section 4.3, there from 90 % on.
     """
     volume = area = 0.0
-    empty = 0
     for e in range(first, first + 4):
-        empty += contents[index(e), E_VOLUME] <= 0.0
         volume += contents[index(e), E_VOLUME]
         area += geometry[index(e), 6]
-    if empty > 1:
-        return 0.0
     fill = min(volume / area, 1.0)
     return fill + (1.0 - fill) * min(max((fill - HALF_FULL) / (FULL - HALF_FULL), 0.0), 1.0)
 
@@ -152,9 +149,15 @@ def felt_share(volume, area, fill):
 
 
 @inline_kernel
-def is_carried(e, start, fill):
-    """Whether an element without points has the mean stress of those beside it, since there is ground around it."""
-    return fill > 0.0 and start[e] == start[e + 1]
+def holding_area(first, start, geometry):
+    """Area of the triangles of a quadrilateral that hold points, 0 if all do [m2]."""
+    area, empty = 0.0, 0
+    for e in range(first, first + index(4)):
+        if start[e] < start[e + 1]:
+            area += geometry[e, 6]
+        else:
+            empty += 1
+    return area if empty > 0 else 0.0
 
 
 @kernel_part
@@ -181,22 +184,20 @@ def resolved_pressure(e, geometry, contents):
     va, vb, vc, vd = contents[a, E_VOLUME], contents[b, E_VOLUME], contents[c, E_VOLUME], contents[d, E_VOLUME]
     if min(va, vb, vc, vd) <= 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    pa, pb, pc, pd = (
-        contents[a, E_PRESSURE] / va, contents[b, E_PRESSURE] / vb, contents[c, E_PRESSURE] / vc,
-        contents[d, E_PRESSURE] / vd,
-    )  # fmt: skip
-    xa, ya, xb, yb = contents[a, E_X] / va, contents[a, E_Y] / va, contents[b, E_X] / vb, contents[b, E_Y] / vb
-    xc, yc, xd, yd = contents[c, E_X] / vc, contents[c, E_Y] / vc, contents[d, E_X] / vd, contents[d, E_Y] / vd
-    ux, uy, wx, wy = xa - xc, ya - yc, xb - xd, yb - yd
+    # reciprocals: of an element's work a division is the dearest
+    ia, ib, ic, id_ = 1.0 / va, 1.0 / vb, 1.0 / vc, 1.0 / vd
+    ux, uy = contents[a, E_X] * ia - contents[c, E_X] * ic, contents[a, E_Y] * ia - contents[c, E_Y] * ic
+    wx, wy = contents[b, E_X] * ib - contents[d, E_X] * id_, contents[b, E_Y] * ib - contents[d, E_Y] * id_
     det = ux * wy - uy * wx
     if det < UNKNOWN_SLOPE * (geometry[a, 6] + geometry[b, 6] + geometry[c, 6] + geometry[d, 6]):
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    sx = (wy * (pa - pc) - uy * (pb - pd)) / det
-    sy = (ux * (pb - pd) - wx * (pa - pc)) / det
-    v = contents[e, E_VOLUME]
-    mean, x, y = contents[e, E_PRESSURE] / v, contents[e, E_X] / v, contents[e, E_Y] / v
+    along = (contents[a, E_PRESSURE] * ia - contents[c, E_PRESSURE] * ic) / det
+    across = (contents[b, E_PRESSURE] * ib - contents[d, E_PRESSURE] * id_) / det
+    sx, sy = wy * along - uy * across, ux * across - wx * along
+    v = 1.0 / contents[e, E_VOLUME]
+    mean, x, y = contents[e, E_PRESSURE] * v, contents[e, E_X] * v, contents[e, E_Y] * v
     g1x, g1y, g2x, g2y = geometry[e, 0], geometry[e, 1], geometry[e, 2], geometry[e, 3]
-    area2 = 1.0 / (g1x * g2y - g1y * g2x)
+    area2 = 2.0 * geometry[e, 6]
     p0 = sx * (geometry[e, 4] - x) + sy * (geometry[e, 5] - y)
     p1 = p0 + (sx * g2y - sy * g2x) * area2
     p2 = p0 + (sy * g1x - sx * g1y) * area2
@@ -524,7 +525,7 @@ def update_kernel(wet, undrained, plastic, tied):
                             if plastic and soils[s, S_MODEL] != MODEL_ELASTIC:
                                 txx, tyy, tzz, txy, cut = mohr_coulomb(
                                     txx, tyy, tzz, txy, shear, soils[s, S_K], soils[s, S_C_COS], soils[s, S_SIN],
-                                    soils[s, S_SIN_DIL], soils[s, S_APEX], soils[s, S_TENSION],
+                                    soils[s, S_SIN_DIL], soils[s, S_APEX], soils[s, S_TENSION], soils[s, S_RELAX], dt,
                                 )  # fmt: skip
                                 if cut > 0.0:
                                     n_tension += 1
@@ -586,10 +587,11 @@ def update_kernel(wet, undrained, plastic, tied):
                 fxy += ahead[e] * (fxy - bxy)
                 fp += ahead[e] * (fp - bp)
             add_forces(g1x, g1y, g2x, g2y, fxx, fyy, fxy, fp, a, b, c, sums)
-            for turn in range(1, 4, 2):  # the triangles beside it in its quadrilateral
-                beside = (e & ~index(3)) + ((e + index(turn)) & index(3))
-                if is_carried(beside, start, contents[e, E_FILL]):
-                    share = 0.5 * geometry[beside, 6] / geometry[e, 6]
+            first_of_cell = e & ~index(3)
+            holding = holding_area(first_of_cell, start, geometry) if contents[e, E_FILL] > 0.0 else 0.0
+            for beside in range(first_of_cell, first_of_cell + index(4)):
+                if holding > 0.0 and start[beside] == start[beside + 1]:  # it has the mean stress of those with points
+                    share = geometry[beside, 6] / holding
                     a, b, c = index(rows[beside, 0]), index(rows[beside, 1]), index(rows[beside, 2])
                     touched[a] = touched[b] = touched[c] = 1
                     add_forces(

@@ -45,8 +45,9 @@ ELEMENT_CONTENTS = 5
 # Soil parameters, one row a soil.
 (
     S_MODEL, S_LAMBDA, S_G, S_K, S_C_COS, S_SIN, S_SIN_DIL, S_APEX, S_TENSION, S_LOOSE, S_DRAG, S_RHO_S,
-) = range(12)  # fmt: skip
-SOIL_WIDTH = 12
+    S_RELAX,
+) = range(13)  # fmt: skip
+SOIL_WIDTH = 13
 MODEL_ELASTIC, MODEL_MOHR_COULOMB = 0, 1
 
 #: What stress, pressure, porosity and place of a point may be held at; each is counted and reported with the run.

@@ -2,6 +2,9 @@
 
 Tension positive. Source: de Souza Neto, Peric & Owen (2008), Computational Methods for
 Plasticity, Box 8.4-8.7; perfectly plastic, dilatancy angle psi <= friction angle phi.
+
+With a relaxation time stress may be beyond the surface and decays to it: viscoplasticity of Duvaut & Lions (1972), Les
+inequations en mecanique et en physique; backward Euler as Simo & Hughes (1998), Computational Inelasticity, Box 2.11.
 """
 
 import numpy as np
@@ -87,11 +90,16 @@ def return_principal(s1, s2, s3, shear, bulk, c_cos, sin_phi, sin_psi, apex, ten
 
 
 @inline_kernel
-def mohr_coulomb(sxx, syy, szz, sxy, shear, bulk, c_cos, sin_phi, sin_psi, apex, tension):
+def mohr_coulomb(
+    sxx, syy, szz, sxy, shear, bulk, c_cos, sin_phi, sin_psi, apex, tension, relaxation_time=0.0, dt=1.0
+):  # fmt: skip
     """Return a plane-strain trial stress to the Mohr-Coulomb surface.
 
     Stresses [Pa], tension positive; parameters as in `return_principal`. The principal
     directions of an isotropic law are those of the trial stress, so they are kept.
+
+    relaxation_time, dt : float
+        In which stress beyond the surface falls by 1/e, 0: at once; since the last stress [s].
 
     Returns
     -------
@@ -113,6 +121,11 @@ def mohr_coulomb(sxx, syy, szz, sxy, shear, bulk, c_cos, sin_phi, sin_psi, apex,
             ra, r3z, rb, cut = return_principal(pa, szz, pb, shear, bulk, c_cos, sin_phi, sin_psi, apex, tension)
         else:
             ra, rb, r3z, cut = return_principal(pa, pb, szz, shear, bulk, c_cos, sin_phi, sin_psi, apex, tension)
+        if relaxation_time > 0.0:
+            keep = relaxation_time / (relaxation_time + dt)
+            ra += keep * (pa - ra)
+            rb += keep * (pb - rb)
+            r3z += keep * (szz - r3z)
         szz = r3z
         centre = 0.5 * (ra + rb)
         ratio = 0.5 * (ra - rb) / radius if radius > 0.0 else 0.0

@@ -35,7 +35,7 @@ def load_path(solver, duration, nodes, component, speed):
 
 def wall(
     direction, strain, cells=10, width=2.0, friction_angle=30.0, dilatancy_angle=0.0, cohesion=0.0, rough_base=False,
-    duration=0.5, damping=0.0, **numerics,
+    duration=0.5, damping=0.0, relaxation_time=0.0, **numerics,
 ):  # fmt: skip
     """Move a smooth wall of 1 m height away from (-1) or into (1) the soil.
 
@@ -48,7 +48,7 @@ def wall(
     mesh = box_mesh(np.arange(columns + 1) * size, np.arange(-cells, 3) * size, fixed_bottom=False)
     soil = {
         "friction_angle": friction_angle, "dilatancy_angle": dilatancy_angle, "cohesion": cohesion,
-        "tensile_strength": 1e8, "youngs_modulus": 1e8,
+        "tensile_strength": 1e8, "youngs_modulus": 1e8, "relaxation_time": relaxation_time,
     }  # fmt: skip
     solver = DrivenSolver(box_scene("wall", size, columns * size, 1.0, soil, **numerics), mesh, damping)
     bottom = np.abs(mesh.nodes[:, 1] + 1.0) < 1e-9
@@ -162,7 +162,7 @@ def loaded_footing(
 WALL_LADDER = {
     "cells": (5, 10, 20), **NUMERICS, "damping": (0.0, 0.3, 0.8), "friction_angle": (20.0, 30.0, 40.0),
     "dilatancy_angle": (0.0, 10.0, 30.0),
-    "cohesion": (0.0, 2e3), "rough_base": (False, True),
+    "cohesion": (0.0, 2e3), "rough_base": (False, True), "relaxation_time": (0.0, 2e-4),
 }  # fmt: skip
 WALL_NORM = "thrust over Rankine's less 1, mean over the last fifth of the path"
 

@@ -18,16 +18,20 @@ class Element:
         [Pa], [deg], [deg], [Pa]
     rotation : float
         Angle from the mesh's to the principal axes in the plane [deg].
+    relaxation : tuple of two floats
+        Relaxation time and time step [s].
     """
 
-    def __init__(self, cohesion, friction_angle, dilatancy_angle, tensile_strength=1e8, rotation=0.0):
+    def __init__(
+        self, cohesion, friction_angle, dilatancy_angle, tensile_strength=1e8, rotation=0.0, relaxation=(0.0, 1.0),
+    ):  # fmt: skip
         phi, psi, turn = np.radians([friction_angle, dilatancy_angle, rotation])
         self.elastic = stiffness(E, NU)
         shear = E / (2 * (1 + NU))
         apex = cohesion / np.tan(phi) if phi > 0 else np.inf
         self.parameters = (
             shear, E / (3 * (1 - 2 * NU)), cohesion * np.cos(phi), np.sin(phi), np.sin(psi), apex,
-            min(tensile_strength, apex),
+            min(tensile_strength, apex), *relaxation,
         )  # fmt: skip
         self.turn = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
 
@@ -138,7 +142,7 @@ _register_laboratory("biaxial-extension", "plane-strain extension, principal axe
 def isotropic(cohesion=2e4, friction_angle=30.0, dilatancy_angle=10.0, tensile_strength=1e8, steps=40):
     """Expand all around beyond the apex or the tensile strength and press again: elastic, capped, elastic at once."""
     element = Element(cohesion, friction_angle, dilatancy_angle, tensile_strength)
-    cap, bulk = element.parameters[-1], element.parameters[1]
+    cap, bulk = element.parameters[6], element.parameters[1]
     reach = 2 * (cap + CONFINEMENT) / (3 * bulk)  # twice the strain to the cap
     stress, exact, worst = np.full(3, -CONFINEMENT), -CONFINEMENT, 0.0
     with Stopwatch() as watch:
@@ -159,6 +163,39 @@ register(Problem(
         "tensile_strength": (0.0, 5e3, 1e8), "steps": (3, 40),
     },
     limit=1e-9, why="piecewise linear: round-off only",
+))  # fmt: skip
+
+
+def overstress(steps=200, relaxation_time=1e-3, duration=1e-2, rate=2.0, rotation=25.0):
+    """Shear soil without friction at a constant rate in the plane: what it bears beyond its strength.
+
+    Reference: x' = 2 G e' - x / tau from yield on, so x = 2 G e' tau (1 - exp(-t / tau)); Duvaut & Lions (1972).
+    """
+    cohesion = 5e3
+    element = Element(cohesion, 0.0, 0.0, rotation=rotation, relaxation=(relaxation_time, duration / steps))
+    shear = element.parameters[0]
+    at_yield = cohesion / (2 * shear * rate)
+    stress, times, beyond = np.full(3, -CONFINEMENT), np.arange(1, steps + 1) * duration / steps, []
+    with Stopwatch() as watch:
+        for _ in times:
+            stress = element.advance(stress, np.array([rate, -rate, 0.0]) * duration / steps)
+            beyond.append((stress[0] - stress[1]) / 2 - cohesion)
+    exact = 2 * shear * rate * relaxation_time * -np.expm1(-np.maximum(times - at_yield, 0.0) / relaxation_time)
+    exact[times < at_yield] = 2 * shear * rate * times[times < at_yield] - cohesion
+    steady = 2 * shear * rate * relaxation_time
+    return Result(
+        error=float(np.abs(np.array(beyond) - exact).max() / steady), values={"steady": float(beyond[-1] / steady)},
+        steps=steps, points=1, cpu_seconds=watch.seconds,
+    )  # fmt: skip
+
+
+register(Problem(
+    name="overstress", title="soil with a relaxation time, sheared at a constant rate",
+    source="Duvaut & Lions (1972): x = 2 G e' tau (1 - exp(-t / tau))",
+    norm="largest error of the stress beyond strength over its steady value",
+    solve=overstress, fast={"steps": 200, "relaxation_time": 1e-3},
+    ladder={"steps": (50, 100, 200, 400), "relaxation_time": (1e-4, 1e-3), "rotation": (0.0, 70.0)},
+    limit=0.02, why="first order in the step over the relaxation time (backward Euler): 1 % with 20 steps in it",
 ))  # fmt: skip
 
 
@@ -188,7 +225,7 @@ def random_paths(increments, friction_angle, dilatancy_angle, tensile_strength, 
     """Zigzag strain paths through planes, edges and cut-off against the event-by-event solution."""
     cohesion = 2e4
     element = Element(cohesion, friction_angle, dilatancy_angle, tensile_strength)
-    planes = yield_planes(cohesion, friction_angle, dilatancy_angle, element.parameters[-1])
+    planes = yield_planes(cohesion, friction_angle, dilatancy_angle, element.parameters[6])
     rates = strain_paths(paths, pieces, mean, seed)
     with Stopwatch() as watch:
         error = path_error(element, planes, rates, increments)
