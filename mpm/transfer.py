@@ -108,8 +108,8 @@ def fill_of_cell(first, geometry, contents):
     Where ground is, the mean stress of each triangle counts with the triangle's area, not with the volume of the points
     that are in it by chance: of three points one that crosses an edge takes a third of the force along, and the ground
     answers with stresses that differ by as much. At a free surface the points of the quadrilateral count, evenly over
-    its triangles; from half full to three quarters the one passes into the other. Empty triangles have the mean stress
-    of the others.
+    its triangles; from half full to three quarters the one passes into the other. One triangle may be empty
+    (`is_carried`), of two nothing is known.
 
     first : int
         First element of the quadrilateral.
@@ -118,9 +118,13 @@ def fill_of_cell(first, geometry, contents):
     method for geomechanical problems, section 4.3, there from 90 % on.
     """
     volume = area = 0.0
+    empty = 0
     for e in range(first, first + 4):
+        empty += contents[index(e), E_VOLUME] <= 0.0
         volume += contents[index(e), E_VOLUME]
         area += geometry[index(e), 6]
+    if empty > 1:
+        return 0.0
     fill = min(volume / area, 1.0)
     return fill + (1.0 - fill) * min(max((fill - HALF_FULL) / (FULL - HALF_FULL), 0.0), 1.0)
 
@@ -149,15 +153,9 @@ def felt_share(volume, area, fill):
 
 
 @inline_kernel
-def holding_area(first, start, geometry):
-    """Area of the triangles of a quadrilateral that hold points, 0 if all do [m2]."""
-    area, empty = 0.0, 0
-    for e in range(first, first + index(4)):
-        if start[e] < start[e + 1]:
-            area += geometry[e, 6]
-        else:
-            empty += 1
-    return area if empty > 0 else 0.0
+def is_carried(e, start, fill):
+    """Whether an element without points has the mean stress of those beside it, since there is ground around it."""
+    return fill > 0.0 and start[e] == start[e + 1]
 
 
 @kernel_part
@@ -587,11 +585,10 @@ def update_kernel(wet, undrained, plastic, tied):
                 fxy += ahead[e] * (fxy - bxy)
                 fp += ahead[e] * (fp - bp)
             add_forces(g1x, g1y, g2x, g2y, fxx, fyy, fxy, fp, a, b, c, sums)
-            first_of_cell = e & ~index(3)
-            holding = holding_area(first_of_cell, start, geometry) if contents[e, E_FILL] > 0.0 else 0.0
-            for beside in range(first_of_cell, first_of_cell + index(4)):
-                if holding > 0.0 and start[beside] == start[beside + 1]:  # it has the mean stress of those with points
-                    share = geometry[beside, 6] / holding
+            for turn in range(1, 4, 2):  # the triangles beside it in its quadrilateral
+                beside = (e & ~index(3)) + ((e + index(turn)) & index(3))
+                if is_carried(beside, start, contents[e, E_FILL]):
+                    share = 0.5 * geometry[beside, 6] / geometry[e, 6]
                     a, b, c = index(rows[beside, 0]), index(rows[beside, 1]), index(rows[beside, 2])
                     touched[a] = touched[b] = touched[c] = 1
                     add_forces(
