@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import time as clock
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -15,13 +16,14 @@ from mpm.errors import errors, largest_so_far
 from mpm.meshing import build_mesh
 from mpm.solver import RunFailed, Solver
 from mpm.state import restore_solver, solver_state
-from mpm.variables import CLAMPS
+from mpm.variables import CLAMPS, VLX, VLY, VSX, VSY, X, Y
 
 if TYPE_CHECKING:
     from mpm.mesh import Mesh
     from mpm.scene import Scene
 
 STEPS_BETWEEN_CHECKS = 50
+BEYOND_REASON = 5.0  # times the speed that weight and pressure can give: a run with such a point is unstable
 SECONDS_BETWEEN_REPORTS = 0.25
 
 
@@ -159,7 +161,8 @@ class Simulation:
         Raises
         ------
         RunFailed
-            When a point becomes non-finite; what was returned stays valid.
+            When a point becomes non-finite, or faster than weight and pressure can make it; what was returned stays
+            valid.
         """
         solver, stop, output = self.solver, self.scene.stop, self.scene.output
         if not self._inside:
@@ -215,6 +218,28 @@ class Simulation:
         self._checked, self._inflow = solver.step_count, solver.inflow_mass()
         ahead = STEPS_BETWEEN_CHECKS * shortest + longest
         self._near = target is not None and solver.inflow_mass(ahead) >= target
+        self._refuse_the_impossible()
+
+    def _refuse_the_impossible(self):
+        """Stop a run with a point several times faster than the weight of all grains makes water that it presses out.
+
+        An unstable run would go on for hours in ever shorter steps.
+        """
+        solver, scene = self.solver, self.scene
+        densest = max(soil.grain_density for soil in scene.soils)
+        lightest = scene.water.density if scene.water is not None else densest
+        possible = math.sqrt(2 * scene.gravity * scene.box.depth * (1 + densest / lightest))
+        if not 0 < BEYOND_REASON * possible < solver.limit_speed:
+            return
+        points = solver.points * (solver.element_of_point >= 0)[:, None]
+        speeds = np.maximum(np.hypot(points[:, VSX], points[:, VSY]), np.hypot(points[:, VLX], points[:, VLY]))
+        fastest = int(speeds.argmax())
+        raise RunFailed(
+            f"a material point moves at {speeds[fastest]:.0f} m/s, where weight and pressure give at most "
+            f"{possible:.0f}: the computation is unstable; try numerics.courant = 0.4 or more points_per_element",
+            solver.time,
+            solver.points[fastest, X : Y + 1],
+        )
 
     def state(self) -> dict[str, Any]:
         """All that decides how the simulation goes on, and its processor time so far.

@@ -10,7 +10,8 @@ import coupling
 import mpm
 import mpm.scene
 import mpm.solver
-from mpm.variables import MASS, VSX, X
+from mpm.simulation import STEPS_BETWEEN_CHECKS
+from mpm.variables import MASS, VSX, VSY, X, Y
 
 
 def quick(**changes):
@@ -106,6 +107,20 @@ def test_run_that_goes_wrong_names_cause_time_and_place():
         solver.step()
     assert "non-finite" in str(failure.value) and failure.value.time == solver.time
     assert np.all(np.abs(failure.value.place) < 100)
+
+
+def test_run_with_a_point_faster_than_weight_can_make_it_stops_as_unstable():
+    simulation = mpm.Simulation(quick())
+    simulation.begin()
+    while simulation.solver.step_count < 2 * STEPS_BETWEEN_CHECKS:  # without the push it goes on
+        simulation.advance()
+    simulation.solver.points[1000, VSX : VSY + 1] = 2e3
+    place = simulation.solver.points[1000, X : Y + 1].copy()
+    with pytest.raises(mpm.RunFailed, match="unstable") as failure:
+        while not simulation.done:
+            simulation.advance()
+    assert failure.value.time > 0
+    assert np.hypot(*(failure.value.place - place)) < 5
 
 
 def test_sink_takes_material_out_and_counts_it():
