@@ -88,11 +88,13 @@ def critical_map(chosen=None, progress=None):
         the actual step; leak [-].
     """
     import xarray as xr
+    from threadpoolctl import threadpool_limits
 
     chosen = list(columns() if chosen is None else chosen)
     rows = []
     for number, (family, column) in enumerate(chosen):
-        row = {"family": family, **asdict(column), **measure(column)}
+        with threadpool_limits(1):  # matrices of some hundred rows: a second thread only waits
+            row = {"family": family, **asdict(column), **measure(column)}
         row["bulk_modulus"] = np.nan if column.bulk_modulus is None else column.bulk_modulus
         rows.append(row | {f"{way}_ratio": row[way] / row["actual"] for way in WAYS})
         if progress is not None:
