@@ -84,44 +84,21 @@ def stop_rows(i, next_row, nodes, mean):
 
 
 @kernel_part
-def solve_nodes(
-    first, last, which, next_row, level_of_row, begun, dt_of_level, touched, sums, mean, gravity, fixed,
-    contact_of_node, normal, active, friction, wall, nodes, status, impulse, ledger,
-):  # fmt: skip
+def solve_nodes(first, last, own, begun, wall, system):
     """Add up the parts of a range of nodes and advance both phases by the time step of each node's finest level.
 
-    Parameters
-    ----------
-    which : (n_nodes,) int32
-        The nodes, by their finest level; next_row, level_of_row : (n_rows,), of :class:`mpm.levels.Levels`.
-    begun : int
-        Levels up to this one begin a step now.
-    dt_of_level : (n_levels,) float64
-        [s]
-    touched : (n_parts, n_rows) uint8
-        Whether a part may have added to a row; else it holds zeros, which are not read.
-    sums : (n_parts, n_rows, 12) float64
-        What the parts of the mesh add to the rows; added in the order of the parts. Written: momenta of rows tied to
-        a finer one, which follow the node.
-    mean : (n_rows - n_nodes, 6) float64
-        Of rows tied to a finer one: mean over their step so far of the velocity of the grains, and of the
-        velocities of both phases that strain, remapped.
-    fixed, status : (n_nodes,) int8
-        Bits of box boundary and mirror line; written: which constraints acted.
-    contact_of_node : (n_nodes,) int32
-        Row of the contact arrays or -1.
-    normal, active, friction : (n_contact, 2), (n_contact,), (n_contact,)
-        Into the material; whether the wall is there; Coulomb coefficient [-].
-    wall : (n_contact, 2) float64 or None
-        Velocity of the wall [m/s]; None where all stand still, which compiles its motion out.
-    nodes : (n_rows, 10) float64
-        Written: new velocities, increments (over their whole step for tied rows), masses.
-    impulse : (n_contact, 5) float64
-        Added: dt times effective normal, water normal, tangential reaction [N s/m], the latter along
-        (ny, -nx) on the material, and dt times the squares of the first two.
-    ledger : (8,) float64
-        Added: see :data:`mpm.variables.LEDGER`.
+    first, last : range of `net.which_node`;  own : part of the ledger;  begun : levels up to it begin a step now;
+    wall : its velocity, of `system.walls` (an argument, so that None compiles its motion out).
+    Written of the `system`: velocities, increments, masses and status of the nodes, means and momenta of rows tied to a
+    finer one, which follow the node, the walls' impulse, the ledger.
     """
+    net, walls, dt_of_level, gravity = system.net, system.walls, system.clock.dt_of_level, system.medium.gravity
+    which, next_row, level_of_row, touched, sums = (
+        net.which_node, net.next_row, net.level_of_row, net.touched, net.sums,
+    )  # fmt: skip
+    nodes, mean, status, ledger = net.nodes, net.tied_means, net.status, system.tally.ledger[own]
+    fixed, contact_of_node, impulse = walls.fixed, walls.contact_of_node, walls.impulse
+    normal, active, friction = walls.normal, walls.active, walls.friction
     px = py = kinetic = by_gravity = by_drag = by_stress = unfelt = reactions = 0.0
     n_nodes = nodes.shape[0] - mean.shape[0]
     for k in range(first, last):
@@ -263,16 +240,20 @@ def one_velocity_kernel(undrained):
     """Kernel `solve_one_velocity` for dry soil, or for pore water that moves with the grains."""
 
     @kernel_part
-    def solve_one_velocity(
-        first, last, which, next_row, level_of_row, begun, dt_of_level, touched, sums, mean, gravity, fixed,
-        contact_of_node, normal, active, friction, wall, nodes, status, impulse, ledger,
-    ):  # fmt: skip
+    def solve_one_velocity(first, last, own, begun, wall, system):
         """`solve_nodes` with one momentum equation a node: of the grains, or undrained, of the mixture.
 
         Undrained is the limit of infinite drag. A wall pushes the mixture or lets it go. Of its push the water bears
         what holds its own momentum, M_l v + dt F_l, but no more than all and no tension; grains bear the rest, which
         limits friction. `nodes` columns of the water's velocity are not touched; V_MS is the mass that moves.
         """
+        net, walls, dt_of_level, gravity = system.net, system.walls, system.clock.dt_of_level, system.medium.gravity
+        which, next_row, level_of_row, touched, sums = (
+            net.which_node, net.next_row, net.level_of_row, net.touched, net.sums,
+        )  # fmt: skip
+        nodes, mean, status, ledger = net.nodes, net.tied_means, net.status, system.tally.ledger[own]
+        fixed, contact_of_node, impulse = walls.fixed, walls.contact_of_node, walls.impulse
+        normal, active, friction = walls.normal, walls.active, walls.friction
         sum_x = sum_y = kinetic = by_gravity = by_stress = unfelt = reactions = 0.0
         n_nodes = nodes.shape[0] - mean.shape[0]
         for k in range(first, last):
@@ -389,18 +370,17 @@ def remap_kernel(two_phase):
     """Kernel `remap_nodes` for water that has a velocity of its own or not."""
 
     @kernel_part
-    def remap_nodes(
-        first, last, which, next_row, level_of_row, finished, dt_of_level, touched, momenta, sums, mean, fixed,
-        contact_of_node, normal, active, wall, nodes, status,
-    ):  # fmt: skip
+    def remap_nodes(first, last, finished, wall, system):
         """Nodal velocities from the updated point momenta (MUSL), under the constraints that acted in this step.
 
         Rows of levels up to `finished` have new momenta; the others keep the node's, which `solve_nodes` has followed
-        in `sums`, and their own velocities become the mean over their step when it ends.
-
-        momenta : (n_parts, n_rows, 4) float64, of `advance_points`
-            Cleared with `sums` and `touched` where they have been read, for `update_points`.
+        in `sums`, and their own velocities become the mean over their step when it ends. `momenta`, `sums` and
+        `touched` are cleared where they have been read, for `update_points`.
         """
+        net, walls, dt_of_level = system.net, system.walls, system.clock.dt_of_level
+        which, next_row, level_of_row, touched = net.which_node, net.next_row, net.level_of_row, net.touched
+        momenta, sums, nodes, mean, status = net.momenta, net.sums, net.nodes, net.tied_means, net.status
+        fixed, contact_of_node, normal, active = walls.fixed, walls.contact_of_node, walls.normal, walls.active
         n_nodes = nodes.shape[0] - mean.shape[0]
         for k in range(first, last):
             i = which[k]

@@ -6,6 +6,9 @@ the others do its parts. They wait only for a part that is begun, some eighty mi
 Stages are numbered by the parts of all stages before them.
 """
 
+from typing import NamedTuple
+
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -99,3 +102,21 @@ def next_stage(meeting, stage, parts):
         if spins > SPINS:
             fall_asleep(PAUSE)
     return stage + parts
+
+
+class Team(NamedTuple):
+    """A thread among those that share the stages of a kernel."""
+
+    thread: int
+    meeting: np.ndarray
+    at: np.ndarray  # (2,) int64: number of the stage at hand; processor time when the thread last looked [us]
+
+
+@kernel_part
+def shared(team, parts):
+    """Parts of a stage that this thread gets, one after the other; ends when all are done, by whomever."""
+    part = take_part(team.meeting, team.at[0], team.thread, parts)
+    while part >= 0:
+        yield part
+        part = next_part(team.meeting, team.at[0], team.thread, parts)
+    team.at[0] = next_stage(team.meeting, team.at[0], parts)

@@ -427,17 +427,11 @@ def update_order(
 
 
 @kernel_part
-def follow_points(
-    left, first_left, n_left, origin, element_of_point, points, soil_of_point, soils, contents, start, order, occupied,
-    n_occupied, spare_start, spare_order,
-):  # fmt: skip
+def follow_points(system, n_occupied):
     """Count the points that `locate` has found with the elements that hold them, and repair the sorting.
 
-    left, origin : (n_points,) int32
-        Those of each part from `first_left` on, `n_left` (n_parts,) int64 of them.
-    contents : (n_elements, 5) float64, of `update_points`
-        Added: these points. Quadrilaterals that they leave empty are not full.
-    Others as of `locate` and `update_order`.
+    Written of the `system`: the points by element, contents of the elements. Quadrilaterals that they leave empty are
+    not full.
 
     Returns
     -------
@@ -446,6 +440,12 @@ def follow_points(
     removed : float
         Grains taken out [kg/m].
     """
+    ground, tally, contents = system.ground, system.tally, system.net.contents
+    element_of_point, points = ground.element_of_point, ground.points
+    soil_of_point, soils = ground.soil_of_point, ground.soils
+    start, order, occupied = ground.start, ground.order, ground.occupied
+    left, origin, first_left, n_left = tally.left, tally.origin, tally.first_left, tally.n_left
+    spare_start, spare_order = tally.spare_start, tally.spare_order
     moved, n_moved, removed = np.empty(n_left.sum(), np.int32), 0, 0.0
     for part in range(n_left.size):
         for k in range(first_left[part], first_left[part] + n_left[part]):
@@ -487,10 +487,7 @@ def locate_kernel(wet, undrained, tied):
     map_point = map_kernel(wet, undrained, tied)
 
     @kernel_part
-    def locate(
-        left, n_left, origin, element_of_point, points, soil_of_point, soils, density_liquid, rows, geometry,
-        neighbours, contents, wave_speed, level_of_element, finished, touched, sums, clamps,
-    ):  # fmt: skip
+    def locate(left, n_left, origin, own, finished, system):
         """Find the new element of every point that left its own, walking over neighbours, and map it there.
 
         A point that would cross the boundary of the mesh is put back on it (and counted); one that
@@ -499,7 +496,7 @@ def locate_kernel(wet, undrained, tied):
         It may be called for a part of the points while others are updated; `follow_points` does the rest.
 
         left, n_left : (n_points,) int32, int
-            Points that left their element, of `update_points`, and how many.
+            Points that left their element, of `update_points`, and how many;  own : the part that sums them up.
         origin : (n_points,) int32
             Written: the elements that they left.
 
@@ -508,6 +505,12 @@ def locate_kernel(wet, undrained, tied):
         limit, limit_speed : float
             As of `update_points`, over these points.
         """
+        ground, net, density_liquid = system.ground, system.net, system.medium.density_liquid
+        element_of_point, points = ground.element_of_point, ground.points
+        soil_of_point, soils = ground.soil_of_point, ground.soils
+        rows, geometry, neighbours, contents = net.rows, net.geometry, net.neighbours, net.contents
+        level_of_element, touched, sums = net.level_of_element, net.touched[own], net.sums[own]
+        wave_speed, clamps = system.pace.wave_speed, system.tally.clamps[own]
         limit = np.inf
         limit_speed = 0.0
         for k in range(n_left):

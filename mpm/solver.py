@@ -32,11 +32,6 @@ from mpm.long_step import (
     SUSPENDED,
     UPDATE,
     Batch,
-    Ground,
-    Medium,
-    Net,
-    Tally,
-    Walls,
     long_step_kernel,
 )
 from mpm.measures import Measures
@@ -50,6 +45,7 @@ from mpm.points import (
     sort_by_element,
 )
 from mpm.spectrum import Spectrum, spectral_time_step
+from mpm.system import Ground, Medium, Net, System, Tally, Walls
 from mpm.tables import element_geometry, element_neighbours, outflow_nodes, soil_table
 from mpm.threads import Threads, check_threads
 from mpm.time_step import dry_wave_speed, fast_wave_speed
@@ -428,8 +424,7 @@ class Solver(Measures):
         counts[:] = self.n_occupied, self.n_active, self.suspended, 0, 0
         self._measures[:] = self.largest_courant, self.removed_mass
         self._bad[:] = -1
-        arguments = (
-            first_pass, last_pass, advance, batch,
+        system = System(
             Ground(
                 self.occupied, self.start, self.order, self.points, self.element_of_point, self.soil_of_point,
                 self.soils,
@@ -448,7 +443,7 @@ class Solver(Measures):
                 self._first_left, self.clamps, self.ledger, *self._left, *self._spare, self._used,
             ),
         )  # fmt: skip
-        others = self.workers.together(self._long_step, *arguments)
+        others = self.workers.together(self._long_step, first_pass, last_pass, advance, batch, system)
         self.n_occupied, self.n_active, self.suspended = (int(counts[k]) for k in (OCCUPIED, ACTIVE, SUSPENDED))
         self.largest_courant = float(self._measures[LARGEST_COURANT])
         self.removed_mass = float(self._measures[REMOVED_MASS])

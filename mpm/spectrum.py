@@ -25,8 +25,8 @@ import numpy as np
 
 from mpm.contact import FIXED_X, FIXED_Y, free_pair
 from mpm.jit import index, kernel, kernel_part
-from mpm.long_step import Ground, Medium
 from mpm.meeting import next_part, next_stage, take_part
+from mpm.system import Ground, Medium
 from mpm.transfer import felt_share
 from mpm.variables import E_FILL, MASS, S_DRAG, S_G, S_LAMBDA, S_RHO_S, N, X, Y
 

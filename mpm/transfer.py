@@ -215,27 +215,24 @@ def advance_kernel(wet, undrained, tied):
     two_phase = wet and not undrained
 
     @kernel_part
-    def advance_points(
-        first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, rows, geometry, nodes,
-        mean, contents, level_of_element, dt_of_level, flip_of_level, filter_of_level, touched, sums,
-    ):  # fmt: skip
+    def advance_points(first, last, own, system):
         """Advance point velocities and positions from the nodes and map new momenta back (MUSL).
 
         Velocities take `flip_of_level` of the FLIP and the rest of the PIC update; positions move with
         the solid. A pore pressure is drawn by `filter_of_level` to what the nodes feel of it (`resolved_pressure`).
         Where water is missing the pressure that acts, zero, is drawn just so: what wet points lose fills dry ones.
 
-        mean : (n_rows - n_nodes, 6) float64
-            Of rows tied to a finer one: mean velocities over the steps of their node, of :mod:`mpm.contact`.
-        contents : (n_elements, 5) float64, of `update_points`
-            Written: how full the elements are.
-        touched : (n_rows,) uint8
-            Set for the rows of these elements.
-        sums : (n_rows, 4) float64
-            Added: the new momenta of both phases, or of the mixture [kg m/s per metre]. `remap_nodes` clears them.
+        first, last : range of the occupied elements;  own : the part that sums up their momenta. Written of the
+        `system`: points, how full the elements are, momenta (cleared by `remap_nodes`), rows touched.
 
         Source: Sulsky, Zhou & Schreyer (1995) for MUSL; Zhu & Bridson (2005) for the PIC/FLIP blend.
         """
+        ground, net, clock, density_liquid = system.ground, system.net, system.clock, system.medium.density_liquid
+        occupied, start, order, points = ground.occupied, ground.start, ground.order, ground.points
+        soil_of_point, soils = ground.soil_of_point, ground.soils
+        rows, geometry, contents, level_of_element = net.rows, net.geometry, net.contents, net.level_of_element
+        nodes, mean, touched, sums = net.nodes, net.tied_means, net.touched[own], net.momenta[own]
+        dt_of_level, flip_of_level, filter_of_level = clock.dt_of_level, clock.flip_of_level, clock.filter_of_level
         n_nodes = index(nodes.shape[0] - mean.shape[0])
         for k in range(first, last):
             e = index(occupied[k])
@@ -401,11 +398,7 @@ def update_kernel(wet, undrained, plastic, tied):
     add_to_node, add_forces = node_kernel(wet, undrained), force_kernel(wet)
 
     @kernel_part
-    def update_points(
-        first, last, occupied, start, order, points, soil_of_point, soils, density_liquid, bulk_liquid, rows,
-        geometry, nodes, contents, level_of_element, dt_of_level, ahead, advance, wave_speed,
-        element_of_point, clamps, touched, sums, left,
-    ):  # fmt: skip
+    def update_points(first, last, own, left, advance, system):
         """Advance stress, pore pressure and porosity of the points of a range of elements, and map them to the nodes.
 
         One pass does both, since passes over the points are what a step costs. `advance` False maps only.
@@ -417,22 +410,12 @@ def update_kernel(wet, undrained, plastic, tied):
         porosity grains do not touch: no effective stress; and while the element is not full, closing
         the air between suspended lumps builds neither stress nor pressure.
 
-        Parameters
-        ----------
-        nodes : (n_rows, 10) float64
-            Their velocities are those of `remap_nodes`.
-        contents : (n_elements, 5) float64
-            Material volume [m2], and times it pore pressure and position, summed over the points; read of the last and
-            written for the next step.
-        ahead : (n_elements,) float64
-            How far the stress that acts on the nodes runs ahead of that of the points, in steps of the element. Held
-            back, a spring feeds motion (`mpm.levels`); ahead, it damps it: a Kelvin-Voigt viscosity of that time.
-        element_of_point : (n_points,) int32
-            Written: -2 - element for a point that left its element.
-        touched : (n_rows,) uint8
-            Set for the rows of these elements.
-        sums : (n_rows, 12) float64
-            Added: masses, momenta, drag and forces of these elements.
+        Stress that acts on the nodes runs ahead of that of the points by `ahead` steps of the element. Held back, a
+        spring feeds motion (`mpm.levels`); ahead, it damps it: a Kelvin-Voigt viscosity of that time.
+
+        first, last : range of the occupied elements;  own : the part that sums them up. Velocities of the nodes are
+        those of `remap_nodes`, contents of the elements those of the last step. Written of the `system`: points,
+        contents, sums, rows touched, clamps, and -2 - element for a point that left its element.
         left : (n_points,) int32
             Written: the points that left their element.
 
@@ -444,6 +427,13 @@ def update_kernel(wet, undrained, plastic, tied):
         limit, limit_speed : float
             Smallest altitude / (wave speed + point speed) / 2^level [s] and the point speed there [m/s].
         """
+        ground, net, medium, clamps = system.ground, system.net, system.medium, system.tally.clamps[own]
+        occupied, start, order, points = ground.occupied, ground.start, ground.order, ground.points
+        element_of_point, soil_of_point, soils = ground.element_of_point, ground.soil_of_point, ground.soils
+        rows, geometry, contents, level_of_element = net.rows, net.geometry, net.contents, net.level_of_element
+        nodes, touched, sums = net.nodes, net.touched[own], net.sums[own]
+        dt_of_level, ahead, wave_speed = system.clock.dt_of_level, system.clock.ahead, system.pace.wave_speed
+        density_liquid, bulk_liquid = medium.density_liquid, medium.bulk_liquid
         limit = np.inf
         limit_speed = 0.0
         moved = 0
