@@ -229,7 +229,7 @@ class Simulation:
         densest = max(soil.grain_density for soil in scene.soils)
         lightest = scene.water.density if scene.water is not None else densest
         possible = math.sqrt(2 * scene.gravity * scene.box.depth * (1 + densest / lightest))
-        if not 0 < BEYOND_REASON * possible < solver.limit_speed:
+        if not 0 < BEYOND_REASON * possible < solver.speed_at_limit:
             return
         points = solver.points * (solver.element_of_point >= 0)[:, None]
         speeds = np.maximum(np.hypot(points[:, VSX], points[:, VSY]), np.hypot(points[:, VLX], points[:, VLY]))

@@ -284,6 +284,11 @@ class Solver(Measures):
         return dt * self._finest_step, LIMITS[limit]
 
     @property
+    def speed_at_limit(self):
+        """Largest speed of the points in the elements that limit the time step, one a part of the mesh [m/s]."""
+        return float(self._limits[:, 1].max())
+
+    @property
     def _pace(self):
         numerics = self.scene.numerics
         return Pace(
