@@ -9,7 +9,7 @@ import xarray as xr
 from test_ring_joints_and_springs import pressures, ring
 from test_sections import UNEQUAL, section
 
-from coupling import check_figures
+from coupling.figures import utilisations as check_figures
 from structure import BeamSpringLining, CapacityRule, InputError, Limits, additional, check
 from structure.checks import UTILISATIONS
 from structure.sections import interaction, radial_utilisation

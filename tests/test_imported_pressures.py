@@ -11,7 +11,7 @@ from test_cli import gush
 import coupling
 import structure
 from coupling.datasets import RunFileError
-from coupling.pressure_source import read_source
+from coupling.responses.source import read_source
 from structure.pressures import WIDEST_GAP, check_pressures
 from verification.robustness.wild_pressures import judged, wild_pressures
 

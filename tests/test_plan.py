@@ -5,7 +5,7 @@ import pytest
 import coupling
 import mpm.solver
 from coupling.datasets import read_history
-from coupling.plan import plan, rough_plan
+from coupling.runs.plan import plan, rough_plan
 from verification.small_event import COARSE, small_scene
 
 

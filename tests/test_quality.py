@@ -8,10 +8,18 @@ from test_cli import simulated  # noqa: F401
 from test_gushing import event, quick  # noqa: F401
 from test_heap import dropped_block
 
+from coupling.commands.describe import describe
 from coupling.datasets import read_attributes, read_history, read_response, write_attributes
-from coupling.info import describe
-from coupling.quality import ERRORS, poor_errors, quality, quality_attributes, quality_line, states_line, verdicts
-from coupling.run import run
+from coupling.postprocess.quality import (
+    ERRORS,
+    poor_errors,
+    quality,
+    quality_attributes,
+    quality_line,
+    states_line,
+    verdicts,
+)
+from coupling.runs.run import run
 from mpm import simulate
 from mpm.errors import COMPARED, errors, largest_so_far
 from mpm.scene import Numerics, Stop

@@ -267,7 +267,7 @@ def test_killed_case_is_continued_not_begun_anew(tmp_path, monkeypatch):
             raise Killed
 
     monkeypatch.setattr(CaseProgress, "__call__", report)
-    monkeypatch.setattr("coupling.recorded_simulation.RecordedSimulation._close_if_possible", lambda *a, **k: None)
+    monkeypatch.setattr("coupling.runs.recorded_simulation.RecordedSimulation._close_if_possible", lambda *a, **k: None)
     monkeypatch.setattr("mpm.simulation.SECONDS_BETWEEN_REPORTS", 0.0)
     with pytest.raises(Killed):
         case_module.run_case(scene.source, str(tmp_path / "killed"), (), 3)

@@ -6,8 +6,8 @@ from typer.testing import CliRunner
 import coupling
 import structure
 from coupling import cli
-from coupling.plan import rough_plan
-from coupling.run_folder import RunRefused
+from coupling.refused import Refused
+from coupling.runs.plan import rough_plan
 from verification.small_event import small_scene
 
 
@@ -32,7 +32,7 @@ def test_run_says_what_a_scene_is(scene, parts, tmp_path):
 def test_run_takes_the_name_of_a_scene():
     # planned alike, and refused only for what comes after the scene
     assert rough_plan("quick") == rough_plan(coupling.load_scene("quick"))
-    with pytest.raises(RunRefused, match="is a file"):
+    with pytest.raises(Refused, match="is a file"):
         coupling.run("quick", __file__)
 
 
@@ -51,7 +51,7 @@ def test_run_takes_the_name_of_a_scene():
 )
 def test_run_refuses_arguments_of_a_wrong_type_before_it_starts(arguments, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(RunRefused, match=message):
+    with pytest.raises(Refused, match=message):
         coupling.run("quick", **arguments)
     assert not list(tmp_path.iterdir())
 

@@ -13,6 +13,7 @@ from coupling.postprocess.elements import (
 )
 from coupling.postprocess.extremes import extremes
 from coupling.postprocess.fields import element_fields
+from coupling.postprocess.flow_zone import Stages, flow_zone_stages
 from coupling.postprocess.geometry import gate_diameter, gate_position, tunnels
 from coupling.postprocess.ground_axes import arch, influence_distance, profile, stress_variation
 from coupling.postprocess.heap import filled, heap
@@ -26,7 +27,6 @@ from coupling.postprocess.inflow import (
     with_inflow,
 )
 from coupling.postprocess.settlement import share_within, surface_settlement, trough
-from coupling.postprocess.stages import Stages, flow_zone_stages
 
 __all__ = [
     "Stages",

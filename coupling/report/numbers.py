@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from coupling.datasets import HISTORY, structure_group
-from coupling.quality import ERRORS, STATES
-from coupling.report.series import match_times, model_names, tunnels_beside
-from coupling.summary import PLACES
+from coupling.datasets.tree import match_times, model_names, tunnels_beside
+from coupling.postprocess.quality import ERRORS, STATES
+from coupling.postprocess.summary import PLACES
 from mpm.variables import CLAMPS
 
 #: What it means that points meet a limit, by its name in :data:`mpm.variables.CLAMPS`.
@@ -19,7 +19,6 @@ MEANINGS = {
     "porosity_ceiling": "held there; no sound run reaches it",
     "returned_to_mesh": "they would have left the mesh within a step",
 }
-
 #: Variable and which extreme of it: (label, unit shown, factor from SI).
 RING_EXTREMES = {
     "axial_force_max": ("axial force N, largest", "kN/m", 1e-3),
@@ -35,8 +34,6 @@ RING_EXTREMES = {
 }
 SHEAR_LIMIT = 0.05  # of the largest Q; the slope of M is taken over one element
 THEORY_LIMIT = 0.02  # of the mean pressure; an element at the lining sees the depth of its middle
-
-
 DIFFERENCE = "difference from"
 
 
@@ -258,15 +255,15 @@ def quality(run, summary, scene=None):
     ----------
     run : xarray.DataTree
     summary : dict
-        From :func:`coupling.summary.summarise_run`.
+        From :func:`coupling.postprocess.summary.summarise_run`.
     scene : coupling.Scene or None
         For the theory of the initial pressures.
 
     Returns
     -------
     list of (str, str, str, bool or None)
-        What, how much, and its verdict: a word of :data:`coupling.quality.ERRORS`, or whether it is within what is
-        expected; None where nothing is expected of it.
+        What, how much, and its verdict: a word of :data:`coupling.postprocess.quality.ERRORS`, or whether it is within
+        what is expected; None where nothing is expected of it.
     """
     values = summary["quality"]
     rows = [(ERRORS[name].label, ERRORS[name].text(values[name]), verdict)

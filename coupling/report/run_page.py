@@ -3,20 +3,15 @@
 import xarray as xr
 
 from coupling.datasets import RunFileError, identifier, read_run, run_file, structure_group
+from coupling.datasets.tree import model_names, tunnels_beside
+from coupling.postprocess.summary import summarise_run
+from coupling.refused import Refused
 from coupling.report.fields import field_snapshots, mesh_picture
 from coupling.report.numbers import key_numbers, quality, warnings
 from coupling.report.packing import packed
-from coupling.report.scene_facts import facts, left_out, read_scene, section
-from coupling.report.series import (
-    choose_frames,
-    history_series,
-    lining_series,
-    model_names,
-    model_series,
-    tunnels_beside,
-)
-from coupling.run_folder import RunRefused
-from coupling.summary import summarise_run
+from coupling.report.scene_facts import left_out, read_scene, section
+from coupling.report.series import choose_frames, history_series, lining_series, model_series
+from coupling.scenes.facts import facts
 
 SCRIPTS = (
     "unpack.js", "run_data.js", "charts.js", "tables.js", "slider.js", "ring_views.js", "history_views.js",
@@ -67,7 +62,7 @@ def _led_by(tree, model):
     if model is None:
         return tree
     if model not in model_names(tree):
-        raise RunRefused(
+        raise Refused(
             f"--model: must be a lining model that has answered, got {model!r}; there are "
             f"{', '.join(model_names(tree)) or 'none'}: run gush respond first"
         )

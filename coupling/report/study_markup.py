@@ -2,7 +2,7 @@
 
 from html import escape
 
-from coupling.quality import ERRORS
+from coupling.postprocess.quality import ERRORS
 from coupling.report.frame import duration, figure, header, provenance, rows_of_facts, scroll, shown
 from coupling.report.run_markup import RING_CHARTS
 from coupling.studies.design import short_names, value_text

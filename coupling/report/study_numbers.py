@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from coupling.quality import ERRORS, poor_errors
+from coupling.postprocess.quality import ERRORS, poor_errors
 from coupling.report.numbers import (
     DIFFERENCE,
     RING_EXTREMES,
@@ -64,7 +64,7 @@ def case_numbers(dataset, models):
 
 
 def balances(dataset):
-    """What a case conserves: name of :func:`coupling.quality.quality` to its value, where the case holds it."""
+    """What a case conserves: names of `coupling.postprocess.quality` to their values, where the case holds them."""
     names = {name: f"quality_{name}" for name in ERRORS}
     return {name: float(dataset[v]) for name, v in names.items() if v in dataset and np.isfinite(dataset[v])}
 
@@ -97,7 +97,7 @@ def case_warnings(dataset, scene):
 def run_facts(folder):
     """What the files of a case's run say: status, status_message, wall_seconds, revision; {} without a readable run."""
     from coupling.datasets import RunFileError, read_attributes
-    from coupling.run_folder import RUN_FILE
+    from coupling.files.folder import RUN_FILE
 
     if not (folder / RUN_FILE).is_file():
         return {}

@@ -37,15 +37,17 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, 
 
     Raises
     ------
-    mpm.RunFailed, structure.LiningFailure, coupling.run_folder.RunRefused
+    mpm.RunFailed, structure.LiningFailure, coupling.refused.Refused
         As :func:`coupling.run`; the study goes on without the case.
     """
 
     from coupling.datasets import read_history, read_pressures, write_response
-    from coupling.provenance import root_attributes
-    from coupling.run import gate_tunnel, respond, respond_beside, run
-    from coupling.run_folder import RUN_FILE, RunRefused
-    from coupling.scene import parse_scene
+    from coupling.files.folder import RUN_FILE
+    from coupling.files.provenance import root_attributes
+    from coupling.refused import Refused
+    from coupling.responses.respond import gate_tunnel, respond, respond_beside
+    from coupling.runs.run import run
+    from coupling.scenes.scene import parse_scene
     from coupling.studies.progress import CaseProgress
     from structure.models import lining_model, model_name
 
@@ -62,7 +64,7 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, 
     report = CaseProgress(place)
     try:
         run(scene, run_folder, threads=threads, resume=True, progress=report)
-    except RunRefused:
+    except Refused:
         # nothing there yet, or what is there began with other versions or has failed
         run(scene, run_folder, overwrite=True, threads=threads, progress=report)
     report({"stage": "respond"})
@@ -106,7 +108,7 @@ def at_inflow_masses(pressures, history, responses, masses):
     import xarray as xr
 
     from coupling.datasets import BALANCES
-    from coupling.quality import quality
+    from coupling.postprocess.quality import quality
 
     reached, unique = _times(history, masses)
     parts = [_at(pressures[["soil_pressure", "water_pressure", "soil_shear"]], reached)]

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coupling.netcdf_group import read_group_at_once
-from coupling.provenance import origin, with_history
+from coupling.datasets.group import read_group_at_once
+from coupling.files.provenance import origin, with_history
 from coupling.studies.design import Case, Study, StudyError
 
 if TYPE_CHECKING:

@@ -16,18 +16,10 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from coupling.scene import (
-    Scene,
-    SceneError,
-    changed,
-    make_scene,
-    nested,
-    number_in_unit,
-    parse_toml,
-    read_scene_data,
-    read_toml_file,
-)
-from coupling.scene_lines import line_of
+from coupling.refused import SceneError
+from coupling.scenes.layers import changed, nested, parse_toml, read_scene_data, read_toml_file
+from coupling.scenes.lines import line_of
+from coupling.scenes.scene import Scene, make_scene, number_in_unit
 
 #: Changes when stored cases can no longer be used.
 FORMAT = "2"
@@ -318,7 +310,14 @@ def _value_in(scene, name):
 def _code() -> str:
     """Hash of the sources that decide a result: `mpm`, `structure`, and what turns a run into a case."""
     total = hashlib.sha256(FORMAT.encode())
-    for package in ("mpm", "structure", "coupling.studies.case", "coupling.run", "coupling.datasets"):
+    for package in (
+        "mpm",
+        "structure",
+        "coupling.studies.case",
+        "coupling.runs",
+        "coupling.responses",
+        "coupling.datasets",
+    ):
         origin = Path(find_spec(package).origin)
         for file in sorted(origin.parent.rglob("*.py")) if origin.name == "__init__.py" else [origin]:
             total.update(file.read_bytes())

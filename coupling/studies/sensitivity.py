@@ -160,7 +160,7 @@ def tornado(result, label: str = "", scale: float = 1.0):
     import matplotlib
 
     from coupling.figures import STYLE
-    from coupling.picture import Picture
+    from coupling.figures.picture import Picture
 
     with matplotlib.rc_context(STYLE):
         names = result["parameter"].values[::-1]
@@ -198,7 +198,7 @@ def scatter(study, quantity, label: str = "", scale: float = 1.0):
     import matplotlib
 
     from coupling.figures import STYLE
-    from coupling.picture import Picture
+    from coupling.figures.picture import Picture
 
     names = [str(name) for name in sensitivity(study, quantity)["parameter"].values]
     parameters = parameters_of(study)

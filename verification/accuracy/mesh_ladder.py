@@ -98,8 +98,9 @@ def run_ladder(name, folder, inflow_mass, levels=LEVELS, progress=None):
     """
     import coupling
     from coupling.datasets import read_attributes, read_history, write_response
-    from coupling.run import respond, run
-    from coupling.run_folder import RUN_FILE
+    from coupling.files.folder import RUN_FILE
+    from coupling.responses.respond import respond
+    from coupling.runs.run import run
 
     base = coupling.load_scene(name)
     runs = []

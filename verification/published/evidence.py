@@ -88,7 +88,7 @@ def initial_theory(scene, tunnel):
     import xarray as xr
 
     from coupling.datasets import cell_centres
-    from coupling.scene import ground_at_axis
+    from coupling.scenes.rings import ground_at_axis
 
     theta = cell_centres()
     angle = np.radians(theta)

@@ -6,8 +6,10 @@ import matplotlib
 import numpy as np
 
 from coupling import postprocess
-from coupling.figures import INITIAL, NOW, STYLE, _closed, _crown_up, _Geometry, _legend_below, _radial_ticks
-from coupling.picture import Picture
+from coupling.figures import INITIAL, NOW, STYLE
+from coupling.figures.picture import Picture
+from coupling.figures.polar import closed_curve, crown_up, legend_below, radial_ticks
+from coupling.figures.tunnel import Geometry
 from verification.published.ground_figures import mass_colours
 
 PRESSURES = {"soil_pressure": "soil pressure", "water_pressure": "water pressure"}
@@ -81,22 +83,22 @@ def pressure_ratios_by_inflow(pressures, masses):
 
 
 def _rings(pressures, panels, labels):
-    geometry = _Geometry(pressures)
+    geometry = Geometry(pressures)
     angle = np.radians(pressures["theta"].values)
     colours = [INITIAL, *mass_colours(len(labels) - 1)]
     with matplotlib.rc_context(STYLE):
         figure = Picture(figsize=(7.2, 4.0), layout="constrained")
         axes = figure.subplots(1, 2, subplot_kw={"projection": "polar"})
         for axis, (title, rows) in zip(axes, panels.values(), strict=True):
-            _crown_up(axis)
+            crown_up(axis)
             for k, (label, row) in enumerate(zip(labels, rows, strict=True)):
                 dashes = {"ls": (0, (4, 2)), "lw": 1.1} if k == 0 else {}
-                axis.plot(*_closed(angle, row.values), color=colours[k], label=label, **dashes)
+                axis.plot(*closed_curve(angle, row.values), color=colours[k], label=label, **dashes)
             axis.set_ylim(0, 1.05 * max(float(row.max()) for row in rows))
-            _radial_ticks(axis, geometry)
+            radial_ticks(axis, geometry)
             geometry.mark_gate(axis)
             axis.set_title(title, pad=12)
-        _legend_below(figure, axes[0])
+        legend_below(figure, axes[0])
     return figure
 
 
@@ -118,18 +120,18 @@ def forces_by_inflow(response, masses):
         figure = Picture(figsize=(7.4, 3.2), layout="constrained")
         axes = figure.subplots(1, 3, subplot_kw={"projection": "polar"})
         for axis, (name, title) in zip(axes, FORCES.items(), strict=True):
-            _crown_up(axis)
-            axis.plot(*_closed(angle, 0 * angle), color="0.2", lw=0.8)
+            crown_up(axis)
+            axis.plot(*closed_curve(angle, 0 * angle), color="0.2", lw=0.8)
             values = [state[name].values / 1e3 for _, state in states]
             for k, ((label, _), row) in enumerate(zip(states, values, strict=True)):
                 dashes = {"ls": (0, (4, 2)), "lw": 1.1} if k == 0 else {}
-                axis.plot(*_closed(angle, row), color=colours[k], label=label, **dashes)
+                axis.plot(*closed_curve(angle, row), color=colours[k], label=label, **dashes)
             low, high = min(0.0, *(row.min() for row in values)), max(row.max() for row in values)
             margin = 0.08 * (high - low)
             axis.set_ylim(low - margin * (low < 0), high + margin)
             if low < 0:
                 axis.set_rorigin(low - margin - 0.5 * (high - low))
-            _radial_ticks(axis, None, 4)
+            radial_ticks(axis, None, 4)
             axis.set_title(title, pad=10)
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))

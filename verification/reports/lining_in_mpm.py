@@ -16,7 +16,7 @@ import coupling
 import mpm
 import structure
 from coupling.datasets import cell_centres, cell_mean_weights
-from coupling.provenance import root_attributes
+from coupling.files.provenance import root_attributes
 from structure import theory
 from verification.pages import DOCS, made_by, need_docs, provenance
 from verification.problems import exact_rings

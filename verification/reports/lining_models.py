@@ -14,10 +14,10 @@ import xarray as xr
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from coupling.compare import compare
-from coupling.compare_figures import forces_compared, joints_compared
 from coupling.figures import RESOLUTION, STYLE
-from coupling.scene import load_scene
+from coupling.figures.comparison import forces_compared, joints_compared
+from coupling.responses.comparison import compare
+from coupling.scenes.scene import load_scene
 from structure import BeamSpringLining, ContinuumLining, LiningFailure
 from structure.theory import curved_section_moment, theoretical_pressures
 from verification.pages import DOCS, made_by, need_docs

@@ -151,7 +151,7 @@ def simulation_fault(place, text, number):
         return bool(all(np.isfinite(a).all() for a in raw_groups(folder, ("lining", "history"))["lining"].values()))
 
     how, answer = in_a_process(work, 120)
-    if how == "raised" and answer[0] & {"RunFailed", "MeshError", "RunRefused"}:
+    if how == "raised" and answer[0] & {"RunFailed", "MeshError", "Refused"}:
         return ""
     return "" if (how, answer) == ("returned", True) else f"run of scene {number} {how}: {str(answer)[-300:]}"
 
@@ -190,8 +190,8 @@ def good_files(place):
     import h5netcdf
     import numpy as np
 
-    from coupling import checkpoint, journal
     from coupling.datasets import CHECKED_FORMAT
+    from coupling.files import checkpoint, journal
     from verification.small_event import small_scene
     from verification.synthetic_run import write_run
 

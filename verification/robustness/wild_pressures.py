@@ -166,7 +166,7 @@ def judged(path, true, kind):
     AssertionError, or whatever the program should not have raised.
     """
     from coupling.datasets import RunFileError
-    from coupling.pressure_source import read_source
+    from coupling.responses.source import read_source
 
     begin = time.monotonic()
     try:

@@ -44,7 +44,7 @@ def figure(data):
     import matplotlib
 
     from coupling.figures import GATE, NOW, STYLE
-    from coupling.picture import Picture
+    from coupling.figures.picture import Picture
 
     with matplotlib.rc_context(STYLE):
         drawn = Picture(figsize=(7.2, 5.6), layout="constrained")
