@@ -9,9 +9,7 @@ from rich.table import Table
 
 from coupling.commands.exit_codes import JsonPath, checked_json, failures, told_warnings, write_json
 from coupling.commands.options import SOURCE, RingScene
-from coupling.datasets import stored_title, write_dataset
 from coupling.refused import Refused
-from coupling.responses.comparison import TITLE
 
 FOLDER, DIFFERENCES = "comparison", "differences.nc"
 
@@ -37,6 +35,7 @@ def store(comparison, source, out=None):
     Refused
         The folder cannot be made, or holds other files under the names that are written.
     """
+    from coupling.datasets import write_dataset
     from coupling.figures import RESOLUTION
     from coupling.figures.comparison import forces_compared, joints_compared
 
@@ -69,6 +68,9 @@ def store(comparison, source, out=None):
 
 def _claim(folder, files):
     """Make the folder; refuse one in which a file would be replaced that no earlier comparison wrote."""
+    from coupling.datasets import stored_title
+    from coupling.responses.comparison import TITLE
+
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except FileExistsError:

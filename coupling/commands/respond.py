@@ -9,7 +9,6 @@ from rich.console import Console
 from coupling.commands.exit_codes import JsonPath, checked_json, failures, told_warnings, write_json
 from coupling.commands.options import SOURCE, RingScene
 from coupling.commands.tables import response_table
-from coupling.files.folder import FIGURES
 
 
 def draw_checks(checked, file, model, own_file=None, tunnel=None):
@@ -20,6 +19,7 @@ def draw_checks(checked, file, model, own_file=None, tunnel=None):
     """
     from coupling.figures import RESOLUTION
     from coupling.figures.utilisations import checks
+    from coupling.files.folder import FIGURES
 
     folder = file.parent / FIGURES
     path = (folder if folder.is_dir() else file.parent) / (
