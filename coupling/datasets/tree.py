@@ -1,4 +1,4 @@
-"""What a run as a tree holds: its lining models, its tunnels, its records at some times."""
+"""What a run as a tree holds: its lining models, its records at some times."""
 
 import numpy as np
 
@@ -10,13 +10,6 @@ def model_names(run, tunnel=None):
     home = structure_group("", tunnel).rstrip("/")
     answered = run[home].children if home in run.children else {}
     return [str(response.attrs.get("model", group)) for group, response in answered.items()]
-
-
-def tunnels_beside(run):
-    """Numbers of the tunnels without the gate."""
-    lining = run["lining"].to_dataset()
-    gate = int(lining.attrs.get("gate_tunnel", 0))
-    return [k for k in range(lining.sizes.get("tunnel", 1)) if k != gate]
 
 
 def match_times(available, wanted):

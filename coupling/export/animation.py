@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from coupling.datasets.geometry import has_tunnels
 from coupling.refused import Refused
 
 SECONDS_OF_ANIMATION, LONGEST_FRAME, LAST_FRAME = 6.0, 0.5, 1.5
@@ -16,7 +17,7 @@ def animation(points, path):
 
     from coupling.figures import common_tops, fields_around_tunnel
 
-    if "tunnel_x" not in points.attrs:
+    if not has_tunnels(points):
         raise Refused("export: an animation shows the surroundings of a tunnel, the scene has none; take vtu")
     tops, pictures = common_tops(points), []
     for k in range(points.sizes["time"]):

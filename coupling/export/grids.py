@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from coupling.datasets.geometry import gate_tunnel, on_tunnel, tunnel_list
 from coupling.datasets.tree import match_times
 
 if TYPE_CHECKING:
@@ -100,34 +101,29 @@ def ring_series(run: xr.DataTree, times: NDArray[np.float64]) -> Iterator[tuple[
     lining = run["lining"].to_dataset() if "lining" in run.children else None
     if lining is None or "soil_pressure" not in lining:
         return
-    gate = int(lining.attrs.get("gate_tunnel", 0))
-    tunnels = range(len(np.atleast_1d(lining.attrs["tunnel_x"])))
-    parts = {"lining": [(k, lining.isel(tunnel=k) if "tunnel" in lining.dims else lining) for k in tunnels]}
+    tunnels = tunnel_list(lining)
+    parts = {"lining": [(k, on_tunnel(lining, k)) for k in range(len(tunnels))]}
     for name, group in run.children.items():
         if name.startswith("structure"):
-            number = int(name.rpartition("_")[2]) if name != "structure" else gate
+            number = int(name.rpartition("_")[2]) if name != "structure" else gate_tunnel(lining)
             for model, response in group.children.items():
                 parts.setdefault(f"ring_{model}", []).append((number, response.to_dataset()))
     for stem, of_tunnels in parts.items():
         rows, present = match_times(of_tunnels[0][1]["time"].values, times)
         if present.any():
-            shape = _ring_shape(lining.attrs, of_tunnels)
+            shape = _ring_shape(tunnels, of_tunnels)
             grids = (_ring_grid(shape, [(k, data.isel(time=row)) for k, data in of_tunnels]) for row in rows[present])
             yield stem, times[present], grids
 
 
-def _ring_shape(geometry, rings):
+def _ring_shape(tunnels, rings):
     """Nodes (n, 3) [m] and quadrilaterals (m, 4) of some rings: a cell for each angle, as thick as the lining."""
     nodes, cells, first = [], [], 0
     for k, ring in rings:
-        x, depth, outer, inner = (
-            float(np.atleast_1d(geometry[f"tunnel_{name}"])[k])
-            for name in ("x", "axis_depth", "outer_radius", "inner_radius")
-        )
-        angle = np.radians(ring["theta"].values)
-        edge = angle - 0.5 * ((angle - np.roll(angle, 1)) % (2 * np.pi))
-        for radius in (outer, inner):
-            nodes.append(_vector(x + radius * np.sin(edge), -depth + radius * np.cos(edge)))
+        angle = ring["theta"].values
+        edge = angle - 0.5 * ((angle - np.roll(angle, 1)) % 360)
+        for radius in (tunnels[k].outer, tunnels[k].inner):
+            nodes.append(_vector(*tunnels[k].at(edge, radius)))
         n, number = len(angle), np.arange(len(angle))
         after = (number + 1) % n
         cells.append(first + np.column_stack([number, after, n + after, n + number]))

@@ -10,8 +10,9 @@ from matplotlib.collections import EllipseCollection, PolyCollection
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.ticker import MaxNLocator
 
+from coupling.datasets.geometry import gate_of, tunnel_of
 from coupling.figures.picture import STYLE, Picture
-from coupling.figures.tunnel import Geometry
+from coupling.figures.tunnel import draw_linings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,8 +41,7 @@ def fields_around_tunnel(
     tunnel : int, optional
         Which one, when there are several; that of the gate when left out.
     """
-    geometry = Geometry(points)
-    x0, y0, radius = geometry.centre if tunnel is None else geometry.centre_of(tunnel)
+    x0, y0, radius, _ = tunnel_of(points, tunnel)
     half = 3.0 * radius if half_width is None else half_width
     data, fields = _fields(points, x0, y0, half)
     with matplotlib.rc_context(STYLE):
@@ -51,7 +51,7 @@ def fields_around_tunnel(
             if norm is None:
                 norm = Normalize(0.0, _top(values, extend) if tops is None else tops[title])
             drawn = _draw_points(axis, data, values, colours, norm)
-            geometry.draw(axis, zorder=3)
+            draw_linings(axis, points, zorder=3)
             frame_view(axis, x0, y0, half)
             bar = figure.colorbar(drawn, ax=axis, shrink=0.92, extend=extend, pad=0.02)
             bar.outline.set_linewidth(0.5)
@@ -69,7 +69,7 @@ def common_tops(points: xr.Dataset) -> dict[str, float]:
 
     points : xarray.Dataset, `/points` of a run.
     """
-    x0, y0, radius = Geometry(points).centre
+    x0, y0, radius, _ = tunnel_of(points)
     tops = {}
     for k in range(points.sizes["time"]):
         _, fields = _fields(points.isel(time=k), x0, y0, 3.0 * radius)
@@ -99,15 +99,14 @@ def _top(values, extend):
 
 def mesh_near_gate(mesh: xr.Dataset, half_width: float | None = None) -> Picture:
     """The mesh around the gate, parts in different colours, with the whole tunnel beside it."""
-    geometry = Geometry(mesh)
+    tunnel, gate = tunnel_of(mesh), gate_of(mesh)
     corners = np.stack([mesh["x"].values, mesh["y"].values], axis=1)[mesh["element_nodes"].values]
     region = mesh["region"].values
     colours = np.array(["#e8d9b5", "#f2b8a8", "#d6e6f2", "#ffffff"])[region]
-    x0, y0, radius = geometry.centre
-    views = [(x0, y0, 1.6 * radius)]
-    if geometry.gate is not None:
-        gx, gy = geometry.at(geometry.gate["angle"], radius - 0.5 * geometry.thickness)
-        views.append((gx, gy, 5 * geometry.gate["width"] if half_width is None else half_width))
+    views = [(tunnel.x, tunnel.y, 1.6 * tunnel.outer)]
+    if gate is not None:
+        middle = tunnel.at(gate.angle, 0.5 * (tunnel.outer + tunnel.inner))
+        views.append((*middle, 5 * gate.width if half_width is None else half_width))
     with matplotlib.rc_context(STYLE):
         figure = Picture(figsize=(3.6 * len(views), 3.5), layout="constrained")
         axes = np.atleast_1d(figure.subplots(1, len(views)))
@@ -116,7 +115,7 @@ def mesh_near_gate(mesh: xr.Dataset, half_width: float | None = None) -> Picture
             axis.add_collection(
                 PolyCollection(corners[near], facecolors=colours[near], edgecolors="0.35", linewidths=line)
             )
-            geometry.draw(axis, zorder=0)
+            draw_linings(axis, mesh, zorder=0)
             frame_view(axis, x, y, half)
             axis.set_xlabel("x [m]")
         axes[0].set_ylabel("y [m]")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 from coupling.datasets import RunFileError, read_history, read_mesh, read_points, read_pressures, read_response
+from coupling.datasets.geometry import has_tunnels, tunnels_beside
 from coupling.figures.ground import fields_around_tunnel, mesh_near_gate
 from coupling.figures.history import inflow
 from coupling.figures.picture import RESOLUTION
@@ -37,11 +36,10 @@ def draw_run(run: str | Path, folder: str | Path) -> list[Path]:
         "deformed_ring": (deformed_ring, lambda: read_response(run)),
         "inflow": (inflow, lambda: read_history(run)),
     }
-    attributes = read_pressures(run).attrs
-    lined = "tunnel_x" in attributes
-    for tunnel in range(len(np.atleast_1d(attributes.get("tunnel_x", [])))):
-        if tunnel != int(attributes.get("gate_tunnel", 0)):
-            sources |= _of_tunnel(run, tunnel)
+    pressures = read_pressures(run)
+    lined = has_tunnels(pressures)
+    for tunnel in tunnels_beside(pressures):
+        sources |= _of_tunnel(run, tunnel)
     written = []
     for name, (draw, read) in sources.items():
         if not lined and name != "inflow":

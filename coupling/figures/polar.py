@@ -14,10 +14,10 @@ def crown_up(axis):
     axis.grid(True)
 
 
-def radial_ticks(axis, geometry, count=5):
+def radial_ticks(axis, gate, count=5):
     """Few radial ticks, written along a ray away from the gate."""
     axis.yaxis.set_major_locator(MaxNLocator(count))
-    away = 172.0 if geometry is None or geometry.gate is None else (geometry.gate["angle"] + 202.5) % 360
+    away = 172.0 if gate is None else (gate.angle + 202.5) % 360
     axis.set_rlabel_position(away)
     axis.tick_params(axis="y", labelsize=6.5, colors="0.3")
     for label in axis.get_yticklabels():

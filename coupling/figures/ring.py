@@ -9,9 +9,10 @@ import matplotlib
 import numpy as np
 from matplotlib.patches import Annulus
 
+from coupling.datasets.geometry import gate_of, gate_tunnel, on_tunnel
 from coupling.figures.picture import GATE, INITIAL, NOW, STYLE, Picture
 from coupling.figures.polar import at_time, closed_curve, crown_up, legend_below, radial_ticks
-from coupling.figures.tunnel import Geometry
+from coupling.figures.tunnel import mark_gate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,9 +31,7 @@ def pressures_polar(pressures: xr.Dataset, time: int = -1, tunnel: int | None = 
     tunnel : int, optional
         Which one, when there are several; that of the gate when left out.
     """
-    geometry = Geometry(pressures)
-    if "tunnel" in pressures.dims:
-        pressures = pressures.isel(tunnel=geometry.tunnel if tunnel is None else tunnel)
+    pressures = on_tunnel(pressures, tunnel)
     angle = np.radians(pressures["theta"].values)
     first, now = pressures.isel(time=0), pressures.isel(time=time)
     with matplotlib.rc_context(STYLE):
@@ -46,9 +45,9 @@ def pressures_polar(pressures: xr.Dataset, time: int = -1, tunnel: int | None = 
             )
             axis.plot(*closed_curve(angle, now[name].values / 1e3), color=NOW, label=at_time(now))
             axis.set_ylim(0, 1.08 * max(first[name].max(), now[name].max()) / 1e3)
-            radial_ticks(axis, geometry)
-            if tunnel is None or tunnel == geometry.tunnel:
-                geometry.mark_gate(axis)
+            radial_ticks(axis, gate_of(pressures))
+            if tunnel in (None, gate_tunnel(pressures)):
+                mark_gate(axis, pressures)
             axis.set_title(title, pad=12)
         legend_below(figure, axes[0])
     return figure

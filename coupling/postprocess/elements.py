@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coupling.postprocess.geometry import gate_position
+from coupling.datasets.geometry import gate_position
 
 if TYPE_CHECKING:
     import xarray as xr

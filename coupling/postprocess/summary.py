@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from coupling.datasets import read_attributes, read_history, read_pressures
+from coupling.datasets.geometry import on_tunnel, tunnels_beside
 from coupling.postprocess.quality import quality, verdicts
 from mpm.variables import CLAMPS
 
@@ -60,14 +61,10 @@ def summarise_run(run: str | Path) -> dict[str, Any]:
     }
     data["verdicts"] = verdicts(data["quality"])
     data["tunnels"] = {}
-    if "tunnel" in pressures.dims:
-        gate = int(pressures.attrs.get("gate_tunnel", 0))
-        for k in range(pressures.sizes["tunnel"]):
-            if k != gate:
-                data["tunnels"][k] = _at_places(pressures.isel(tunnel=k)) | {"response": None}
-        pressures = pressures.isel(tunnel=gate)
     if "soil_pressure" in pressures:
-        data |= _at_places(pressures)
+        for k in tunnels_beside(pressures):
+            data["tunnels"][k] = _at_places(on_tunnel(pressures, k)) | {"response": None}
+        data |= _at_places(on_tunnel(pressures))
     return data
 
 

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from coupling.datasets import HISTORY, structure_group
-from coupling.datasets.tree import match_times, model_names, tunnels_beside
+from coupling.datasets.geometry import gate_of, has_tunnels, on_tunnel, tunnel_of, tunnels_beside
+from coupling.datasets.tree import match_times, model_names
 from coupling.postprocess.quality import ERRORS, STATES
 from coupling.postprocess.summary import PLACES
 from mpm.variables import CLAMPS
@@ -73,7 +74,7 @@ def key_numbers(run):
         Title of a group to its list of Number; groups without numbers are left out.
     """
     groups = {"Gushing": _inflow_numbers(run)}
-    for tunnel in (None, *tunnels_beside(run)):
+    for tunnel in (None, *tunnels_beside(run["lining"])):
         of = "" if tunnel is None else f" of tunnel {tunnel}"
         groups[f"Pressures on the lining{of}"] = _pressure_numbers(run["lining"].to_dataset(), tunnel)
         title = ", ".join([f"Forces and deformation of the ring{of}", *model_names(run, tunnel)[:1]])
@@ -104,12 +105,10 @@ def _inflow_numbers(run):
 def _mass_of_a_point_inside(run):
     """Largest grain mass of a point inside the gate's tunnel at the last snapshot [kg/m]: inflow is counted in them."""
     points = run["points"].to_dataset() if "points" in run.children else None
-    if points is None or "grain_mass" not in points or not points.sizes["time"] or "tunnel_x" not in points.attrs:
+    if points is None or "grain_mass" not in points or not points.sizes["time"] or not has_tunnels(points):
         return 0.0
-    attrs, k = points.attrs, int(points.attrs.get("gate_tunnel", 0))
-    x, depth, inner = (np.atleast_1d(attrs[f"tunnel_{n}"])[k] for n in ("x", "axis_depth", "inner_radius"))
-    last = points.isel(time=-1)
-    inside = np.hypot(last["x"].values - x, last["y"].values + depth) < inner
+    last, tunnel = points.isel(time=-1), tunnel_of(points)
+    inside = tunnel.distance(last["x"].values, last["y"].values) < tunnel.inner
     return float(np.nanmax(last["grain_mass"].values[inside])) if inside.any() else 0.0
 
 
@@ -151,13 +150,12 @@ def scatter(values, spread):
 def _pressure_numbers(lining, tunnel):
     if "soil_pressure" not in lining:
         return []
-    if "tunnel" in lining.dims:
-        lining = lining.isel(tunnel=int(lining.attrs.get("gate_tunnel", 0)) if tunnel is None else tunnel)
+    lining = on_tunnel(lining, tunnel)
     numbers, key = [], "" if tunnel is None else f"tunnel_{tunnel}_"
     for name, label in (("soil_pressure", "soil"), ("water_pressure", "water")):
         for place, theta in PLACES.items():
             series, spread = lining[name].sel(theta=theta).values, lining[f"{name}_std"].sel(theta=theta).values
-            open_here = tunnel is None and len(series) > 1 and _in_gate(lining.attrs, theta)
+            open_here = tunnel is None and len(series) > 1 and _in_gate(lining, theta)
             numbers.append(
                 Number(
                     f"{key}{name}_{theta}", f"{label}, {place}{' (the gate)' if open_here else ''}", "kPa", 1e-3,
@@ -168,13 +166,13 @@ def _pressure_numbers(lining, tunnel):
     return numbers
 
 
-def _in_gate(geometry, theta):
+def _in_gate(lining, theta):
     """Whether an angle [degree] lies in the gate, where the open lining carries no pressure."""
-    if "gate_angle" not in geometry:
+    gate = gate_of(lining)
+    if gate is None:
         return False
-    outer = float(np.atleast_1d(geometry["tunnel_outer_radius"])[int(geometry["gate_tunnel"])])
-    half = np.degrees(np.arcsin(min(1.0, 0.5 * float(geometry["gate_width"]) / outer)))
-    return abs((theta - float(geometry["gate_angle"]) + 180) % 360 - 180) <= half
+    half = np.degrees(np.arcsin(min(1.0, 0.5 * gate.width / tunnel_of(lining).outer)))
+    return abs((theta - gate.angle + 180) % 360 - 180) <= half
 
 
 def initial_theory(scene, theta):
@@ -269,7 +267,7 @@ def quality(run, summary, scene=None):
     rows = [(ERRORS[name].label, ERRORS[name].text(values[name]), verdict)
             for name, verdict in summary["verdicts"].items()]  # fmt: skip
     rows += _against_theory(run["lining"].to_dataset(), scene)
-    answers = [(model, k) for k in (None, *tunnels_beside(run)) for model in model_names(run, k)]
+    answers = [(model, k) for k in (None, *tunnels_beside(run["lining"])) for model in model_names(run, k)]
     for model, tunnel in answers:
         response = run[structure_group(model, tunnel)].to_dataset()
         name = model if tunnel is None else f"{model}, tunnel {tunnel}"
@@ -328,7 +326,7 @@ def warnings(run, attributes, quality_rows):
     models = model_names(run)
     if "soil_pressure" in lining and not models:
         found.append("No lining model has answered to the pressures: run `gush respond` on this run.")
-    for tunnel in tunnels_beside(run) if models else ():
+    for tunnel in tunnels_beside(run["lining"]) if models else ():
         if not model_names(run, tunnel):
             found.append(f"No lining model has answered for tunnel {tunnel}: run `gush respond` on this run.")
     for name in models:

@@ -3,7 +3,8 @@
 import xarray as xr
 
 from coupling.datasets import RunFileError, identifier, read_run, run_file, structure_group
-from coupling.datasets.tree import model_names, tunnels_beside
+from coupling.datasets.geometry import tunnels_beside
+from coupling.datasets.tree import model_names
 from coupling.postprocess.summary import summarise_run
 from coupling.refused import Refused
 from coupling.report.fields import field_snapshots, mesh_picture
@@ -77,10 +78,10 @@ def _player(tree, scene, frames, fields):
     return {
         "time": packed(times),
         "inflow_mass": packed(lining["inflow_mass"].values[frames]),
-        "section": section(scene, lining.attrs),
+        "section": section(scene, lining),
         "lining": lining_series(tree, frames),
         "models": _models(tree, None, times),
-        "models_beside": {k: _models(tree, k, times) for k in tunnels_beside(tree)},
+        "models_beside": {k: _models(tree, k, times) for k in tunnels_beside(tree["lining"])},
         "history": history_series(tree),
         "mesh": mesh_picture(tree["mesh"].to_dataset()) if "mesh" in tree.children else None,
         "fields": fields,

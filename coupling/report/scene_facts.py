@@ -1,5 +1,6 @@
 """What was computed: the scene in numbers, its section through the ground, and what was left out."""
 
+from coupling.datasets.geometry import gate_of, has_tunnels, tunnel_list
 from coupling.refused import SceneError
 from coupling.scenes.scene import parse_scene
 
@@ -20,14 +21,14 @@ def left_out(scene):
     return [row for row in features(scene, 1) if row["feature"] != "several threads"]
 
 
-def section(scene, geometry):
+def section(scene, lining):
     """What the page needs to draw the ground in section.
 
     Parameters
     ----------
     scene : coupling.Scene or None
-    geometry : dict
-        Attributes of `/lining`: tunnels and gate.
+    lining : xarray.Dataset
+        `/lining`, whose attributes are tunnels and gate.
 
     Returns
     -------
@@ -35,21 +36,10 @@ def section(scene, geometry):
         tunnels: list of {x, y, outer, inner} [m]; gate: {tunnel, angle [degree], width [m]} or None; box: {width,
         depth} or None; water_table: depth [m] or None; soils: list of {name, top}.
     """
-    from numpy import atleast_1d
-
-    names = ("tunnel_x", "tunnel_axis_depth", "tunnel_outer_radius", "tunnel_inner_radius")
-    columns = [atleast_1d(geometry[name]) for name in names] if names[0] in geometry else [(), (), (), ()]
-    tunnels = [
-        {"x": float(x), "y": -float(depth), "outer": float(outer), "inner": float(inner)}
-        for x, depth, outer, inner in zip(*columns, strict=True)
-    ]
-    gate = None
-    if "gate_angle" in geometry:
-        gate = {"tunnel": int(geometry["gate_tunnel"]), "angle": float(geometry["gate_angle"]),
-                "width": float(geometry["gate_width"])}  # fmt: skip
+    gate = gate_of(lining)
     return {
-        "tunnels": tunnels,
-        "gate": gate,
+        "tunnels": [tunnel._asdict() for tunnel in (tunnel_list(lining) if has_tunnels(lining) else ())],
+        "gate": None if gate is None else gate._asdict(),
         "box": None if scene is None else {"width": scene.mpm.box.width, "depth": scene.mpm.box.depth},
         "water_table": None if scene is None or scene.mpm.water is None else scene.mpm.water.table_depth,
         "soils": [] if scene is None else [{"name": s.name, "top": s.top_depth} for s in scene.mpm.soils],

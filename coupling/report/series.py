@@ -5,7 +5,8 @@ import json
 import numpy as np
 
 from coupling.datasets import RunFileError
-from coupling.datasets.tree import match_times, model_names, tunnels_beside
+from coupling.datasets.geometry import tunnels_beside
+from coupling.datasets.tree import match_times, model_names
 from coupling.report.packing import BASE64, evenly, packed
 
 PRESSURES = ("soil_pressure", "water_pressure", "soil_shear")
@@ -26,7 +27,7 @@ def choose_frames(run):
     """
     lining = run["lining"].to_dataset()
     fields = len(PRESSURES) * lining.sizes.get("tunnel", 1)
-    fields += len(RING_FIELDS) * sum(len(model_names(run, tunnel)) for tunnel in (None, *tunnels_beside(run)))
+    fields += len(RING_FIELDS) * sum(len(model_names(run, tunnel)) for tunnel in (None, *tunnels_beside(run["lining"])))
     bytes_each = 4 * BASE64 * fields * 360
     return evenly(lining.sizes["time"], min(MOST_FRAMES, int(BYTES_OF_FRAMES / bytes_each)))
 

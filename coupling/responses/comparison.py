@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from coupling.datasets.geometry import gate_of
 from coupling.files.provenance import origin, with_history
 from coupling.refused import Refused
 
@@ -98,13 +99,13 @@ def compare(source, first="beam-spring", second="continuum", open_gate=None):
 
 
 def _gate_options(source, cut):
-    attributes = source.pressures.attrs
-    if "gate_angle" not in attributes or "gate_width" not in attributes:
+    gate = gate_of(source.pressures)
+    if gate is None or gate.width is None:
         raise Refused(
             f"'{source.file}': an open gate needs the attributes gate_angle [degree] and gate_width [m] of the"
             " pressures, got none; leave --open-gate out"
         )
-    return {"gate": (float(attributes["gate_angle"]), float(attributes["gate_width"]), cut)}
+    return {"gate": (gate.angle, gate.width, cut)}
 
 
 def _differences(first, second, ring):

@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coupling.datasets import read_pressures, write_response
+from coupling.datasets.geometry import on_tunnel
 from coupling.files.folder import RUN_FILE
 from coupling.refused import Refused, SceneError
-from coupling.scenes.rings import ring_of
+from coupling.scenes.rings import gate_tunnel, ring_of
 from structure.models import model_name
 
 if TYPE_CHECKING:
@@ -30,9 +31,8 @@ def respond(scene: Scene, pressures: xr.Dataset, backend: str = "beam-spring", t
     structure.LiningFailure
         No equilibrium.
     """
-    number = gate_tunnel(scene) if tunnel is None else tunnel
-    if "tunnel" in pressures.dims:
-        pressures = pressures.isel(tunnel=number, drop=True)
+    number = gate_tunnel(scene.mpm) if tunnel is None else tunnel
+    pressures = on_tunnel(pressures, number)
     try:
         ring = ring_of(scene, number)
     except SceneError as problem:
@@ -40,16 +40,11 @@ def respond(scene: Scene, pressures: xr.Dataset, backend: str = "beam-spring", t
     return respond_by_name(ring, pressures, backend)
 
 
-def gate_tunnel(scene: Scene) -> int:
-    """Number of the tunnel with the gate, 0 without one."""
-    return scene.mpm.gate.tunnel if scene.mpm.gate else 0
-
-
 def respond_beside(scene: Scene, folder: Path, backend: str = "beam-spring") -> list[int]:
     """Store the responses of the tunnels without the gate, each of its own ring; returns their numbers."""
     if scene.ring is None:
         return []
-    others = [k for k in range(len(scene.mpm.tunnels)) if k != gate_tunnel(scene)]
+    others = [k for k in range(len(scene.mpm.tunnels)) if k != gate_tunnel(scene.mpm)]
     for k in others:
         response = respond(scene, read_pressures(folder), backend, k)
         write_response(folder / RUN_FILE, response, model_name(backend), tunnel=k)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 from pydantic import ValidationError
 
 from coupling.datasets import RunFileError, read_group, run_file
+from coupling.datasets.geometry import on_tunnel, tunnels_beside
 
 
 class Source(NamedTuple):
@@ -69,17 +70,13 @@ def read_sources(path, scene=None):
         chosen = load_scene(scene)
     if "tunnel" not in pressures.dims:
         return [_source(file, is_run, pressures, root, own, chosen, None)]
-    gate = int(pressures.attrs.get("gate_tunnel", 0))
-    numbers = [gate, *(k for k in range(pressures.sizes["tunnel"]) if k != gate)]
+    numbers = [None, *tunnels_beside(pressures)]
     if chosen is not None and len(chosen.mpm.tunnels) < len(numbers):
         raise RunFileError(
             f"'{file}': holds {len(numbers)} tunnels, scene '{chosen.name}' has {len(chosen.mpm.tunnels)}; choose a "
             "--scene with as many, or select a tunnel of the pressures"
         )
-    return [
-        _source(file, is_run, pressures.isel(tunnel=k, drop=True), root, own, chosen, None if k == gate else k)
-        for k in numbers
-    ]
+    return [_source(file, is_run, on_tunnel(pressures, k), root, own, chosen, k) for k in numbers]
 
 
 def _source(file, is_run, pressures, root, own, chosen, tunnel):

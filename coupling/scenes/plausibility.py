@@ -6,6 +6,7 @@ import math
 import warnings
 from typing import TYPE_CHECKING, Any
 
+from coupling.scenes.rings import gate_tunnel
 from structure.inputs import GushingWarning
 from structure.plausibility import (
     DENSITY,
@@ -112,7 +113,7 @@ def _narrow_box(scene):
 
 def _other_rings(scene):
     """Where a ring is taken for a tunnel of other diameters than those of [ring]."""
-    ring, own = scene.ring, scene.mpm.gate.tunnel if scene.mpm.gate is not None else 0
+    ring, own = scene.ring, gate_tunnel(scene.mpm)
     return [
         f"tunnels[{k}] is not as wide as tunnel {own}, which [ring] describes: its ring is taken with the concrete and "
         "joints of [ring] and its own diameters; leave its forces aside if it is built otherwise"

@@ -15,11 +15,16 @@ if TYPE_CHECKING:
     from mpm.scene import Scene as MpmScene
 
 
+def gate_tunnel(scene: MpmScene) -> int:
+    """Number of the tunnel with the gate, which [ring] describes; 0 without a gate."""
+    return scene.gate.tunnel if scene.gate is not None else 0
+
+
 def derived_ring(scene: MpmScene) -> dict[str, Any]:
     """Keys of ``[ring]`` that follow from the tunnel with the gate, else the first: diameters and `ground`."""
     if not scene.tunnels:
         return {}
-    tunnel = scene.tunnels[scene.gate.tunnel if scene.gate is not None else 0]
+    tunnel = scene.tunnels[gate_tunnel(scene)]
     return {
         "outer_diameter": tunnel.outer_diameter,
         "inner_diameter": tunnel.inner_diameter,
@@ -38,7 +43,7 @@ def ring_of(scene: Scene, tunnel: int) -> Ring:
     """
     if scene.ring is None:
         raise SceneError(f"scene '{scene.name}': has no [ring]; add one to get internal forces")
-    own = scene.mpm.gate.tunnel if scene.mpm.gate is not None else 0
+    own = gate_tunnel(scene.mpm)
     if tunnel == own:
         return scene.ring
     there, home = scene.mpm.tunnels[tunnel], scene.mpm.tunnels[own]

@@ -42,10 +42,11 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, 
     """
 
     from coupling.datasets import read_history, read_pressures, write_response
+    from coupling.datasets.geometry import on_tunnel
     from coupling.files.folder import RUN_FILE
     from coupling.files.provenance import root_attributes
     from coupling.refused import Refused
-    from coupling.responses.respond import gate_tunnel, respond, respond_beside
+    from coupling.responses.respond import respond, respond_beside
     from coupling.runs.run import run
     from coupling.scenes.scene import parse_scene
     from coupling.studies.progress import CaseProgress
@@ -69,8 +70,7 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, 
         run(scene, run_folder, overwrite=True, threads=threads, progress=report)
     report({"stage": "respond"})
     pressures, history = read_pressures(run_folder), read_history(run_folder)
-    if "tunnel" in pressures.dims:
-        pressures = pressures.isel(tunnel=gate_tunnel(scene), drop=True)
+    pressures = on_tunnel(pressures)
     responses = {}
     for name, backend in models.items():
         responses[name] = respond(scene, pressures, backend)

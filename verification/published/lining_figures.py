@@ -6,10 +6,11 @@ import matplotlib
 import numpy as np
 
 from coupling import postprocess
+from coupling.datasets.geometry import gate_of
 from coupling.figures import INITIAL, NOW, STYLE
 from coupling.figures.picture import Picture
 from coupling.figures.polar import closed_curve, crown_up, legend_below, radial_ticks
-from coupling.figures.tunnel import Geometry
+from coupling.figures.tunnel import mark_gate
 from verification.published.ground_figures import mass_colours
 
 PRESSURES = {"soil_pressure": "soil pressure", "water_pressure": "water pressure"}
@@ -83,7 +84,6 @@ def pressure_ratios_by_inflow(pressures, masses):
 
 
 def _rings(pressures, panels, labels):
-    geometry = Geometry(pressures)
     angle = np.radians(pressures["theta"].values)
     colours = [INITIAL, *mass_colours(len(labels) - 1)]
     with matplotlib.rc_context(STYLE):
@@ -95,8 +95,8 @@ def _rings(pressures, panels, labels):
                 dashes = {"ls": (0, (4, 2)), "lw": 1.1} if k == 0 else {}
                 axis.plot(*closed_curve(angle, row.values), color=colours[k], label=label, **dashes)
             axis.set_ylim(0, 1.05 * max(float(row.max()) for row in rows))
-            radial_ticks(axis, geometry)
-            geometry.mark_gate(axis)
+            radial_ticks(axis, gate_of(pressures))
+            mark_gate(axis, pressures)
             axis.set_title(title, pad=12)
         legend_below(figure, axes[0])
     return figure
