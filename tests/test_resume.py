@@ -69,7 +69,7 @@ def in_child(work, prepare=lambda: None):
     if child == 0:
         code = 2
         try:
-            datasets.SECONDS_BETWEEN_WRITES = 0.0
+            datasets.writer.SECONDS_BETWEEN_WRITES = 0.0
             prepare()
             work()
             code = 0

@@ -7,7 +7,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from coupling.datasets import RunFileError
+from coupling.datasets import RunFileError, opened, read_attributes, read_history
 from coupling.files.folder import RUN_FILE, how_to_go_on
 from coupling.files.own_content import require_own_content
 from coupling.refused import Refused
@@ -95,10 +95,11 @@ def _file(path):
 
 def _netcdf(path):
     import h5netcdf
+    import h5py
 
     try:
-        require_own_content(path)
-        with h5netcdf.File(path, "r") as content:
+        with h5py.File(path, "r") as file, h5netcdf.File(file, "r") as content:
+            require_own_content(file)
             groups, title = list(content.groups), str(content.attrs.get("title", ""))
             names = list(content.variables)
     except Exception as error:
@@ -115,12 +116,11 @@ def _netcdf(path):
 
 
 def _run_facts(file):
-    import h5netcdf
-
-    from coupling.datasets import read_attributes, read_history
     from coupling.postprocess.quality import poor_errors, quality_line, stored_quality
 
-    attributes, history = read_attributes(file), read_history(file)
+    with opened(file) as run:  # sizes only of the points: those of a long run are many
+        attributes, history, models = read_attributes(run), read_history(run), list(run.models())
+        sizes = {"snapshots of the points": run.size("points", "time"), "triangles": run.size("mesh", "element")}
     facts = {
         "scene": attributes.get("scene_name", "unknown"),
         "status": " ".join(filter(None, (attributes.get("status", ""), attributes.get("status_message", "")))),
@@ -130,14 +130,7 @@ def _run_facts(file):
     if facts["records"]:
         last = history.isel(time=-1)
         facts |= {"time [s]": float(last["time"]), "inflow mass [kg/m]": float(last["inflow_mass"])}
-    # sizes only: the points of a long run are many
-    with h5netcdf.File(file, "r") as content:
-        if "points" in content.groups:
-            facts["snapshots of the points"] = int(content["points"].dimensions["time"].size)
-        if "mesh" in content.groups:
-            facts["triangles"] = int(content["mesh"].dimensions["element"].size)
-        stored = content["structure"].groups if "structure" in content.groups else {}
-        models = [str(group.attrs.get("model", name)) for name, group in stored.items()]
+    facts |= {name: size for name, size in sizes.items() if size is not None}
     facts["lining models"] = ", ".join(models) or "none"
     errors = stored_quality(attributes)
     facts |= {"errors": quality_line(errors)} if errors else {}

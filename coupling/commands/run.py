@@ -44,7 +44,7 @@ def run_command(
     see `coupling.commands.events.EventStream`.
     """
     with failures(), checked_json(json_path), checked_json(events), EventStream(events) as stream, told_warnings():
-        from coupling.datasets import RunFileError, read_response
+        from coupling.datasets import RunFileError, opened, read_response
         from coupling.files.folder import FIGURES
         from coupling.postprocess.quality import quality_line, states_line, verdicts
         from coupling.postprocess.summary import summarise_response, summarise_run
@@ -62,13 +62,14 @@ def run_command(
                 warn=stream.warning(warn), response=not no_response,
             )  # fmt: skip
         folder = Path(pressures.attrs["run"])
-        data = {"run": str(folder), **summarise_run(folder), "response": None}
-        with contextlib.suppress(RunFileError):
-            data["response"] = summarise_response(read_response(folder))
-            data["quality"]["lining_equilibrium"] = data["response"]["equilibrium_residual"]
-            data["verdicts"] = verdicts(data["quality"])
-            for tunnel, one in data["tunnels"].items():
-                one["response"] = summarise_response(read_response(folder, tunnel=tunnel))
+        with opened(folder) as file:
+            data = {"run": str(folder), **summarise_run(file), "response": None}
+            with contextlib.suppress(RunFileError):
+                data["response"] = summarise_response(read_response(file))
+                data["quality"]["lining_equilibrium"] = data["response"]["equilibrium_residual"]
+                data["verdicts"] = verdicts(data["quality"])
+                for tunnel, one in data["tunnels"].items():
+                    one["response"] = summarise_response(read_response(file, tunnel=tunnel))
         data["figures"] = sorted(str(path) for path in (folder / FIGURES).glob("*.png"))
         write_json(json_path, data)
         stream.tell("result", **data)

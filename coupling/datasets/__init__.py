@@ -6,7 +6,8 @@ uniform theta grid), `/history` (inflow, zones, balances, time step), `/points` 
 carries attributes only: provenance and `status`.
 """
 
-from coupling.datasets.additions import CHECKED_FORMAT, write_attributes, write_dataset, write_response
+from coupling.datasets.additions import CHECKED_FORMAT, write_attributes, write_dataset, write_response, write_responses
+from coupling.datasets.open_run import OpenRun, opened, run_file
 from coupling.datasets.reader import (
     raw_groups,
     read_attributes,
@@ -17,7 +18,6 @@ from coupling.datasets.reader import (
     read_pressures,
     read_response,
     read_run,
-    run_file,
     stored_title,
 )
 from coupling.datasets.schema import (
@@ -32,7 +32,7 @@ from coupling.datasets.schema import (
     structure_group,
 )
 from coupling.datasets.theta_grid import cell_bounds, cell_centres, cell_mean_weights
-from coupling.datasets.writer import SECONDS_BETWEEN_WRITES, RunWriter
+from coupling.datasets.writer import RunWriter
 from coupling.refused import RunFileError
 
 __all__ = [
@@ -46,7 +46,8 @@ __all__ = [
     "RING_FORCES",
     "RunFileError",
     "RunWriter",
-    "SECONDS_BETWEEN_WRITES",
+    "OpenRun",
+    "opened",
     "cell_bounds",
     "cell_centres",
     "cell_mean_weights",
@@ -66,4 +67,5 @@ __all__ = [
     "write_attributes",
     "write_dataset",
     "write_response",
+    "write_responses",
 ]

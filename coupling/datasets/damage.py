@@ -11,17 +11,23 @@ from coupling.refused import RunFileError
 
 
 @contextlib.contextmanager
-def damage_named(path):
-    """Turn what the HDF5 library raises in a damaged file into a message; the file is as it was."""
+def damage_told(file, group=None, writing=False):
+    """Turn what the libraries raise in a damaged file, or in one group of it, into a message.
+
+    writing : bool, leave what is no damage as it is: a full disk, a missing right, a mistake of the program.
+    """
     try:
         yield
-    except (OSError, RuntimeError, KeyError) as error:
-        if getattr(error, "errno", None) is not None:
-            raise  # a full disk, a missing right
-        raise RunFileError(why_unreadable(Path(path), None, error)) from error
+    except RunFileError:
+        raise
+    except Exception as error:
+        damaged = isinstance(error, OSError | RuntimeError | KeyError) and getattr(error, "errno", None) is None
+        if writing and not damaged:
+            raise
+        raise RunFileError(_why_unreadable(Path(file), group, error)) from error
 
 
-def why_unreadable(file, group, error):
+def _why_unreadable(file, group, error):
     # a library's message may quote what it met in the file
     said = "".join(c if c.isprintable() else "?" for c in str(error))[:200]
     try:

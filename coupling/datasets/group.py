@@ -4,6 +4,8 @@ Whenever h5netcdf is asked for the length of an unlimited dimension it looks at 
 opening a group of n variables through xarray takes n² look-ups: seconds for the history of a run.
 """
 
+import contextlib
+
 import numpy as np
 
 
@@ -12,7 +14,7 @@ def read_group_at_once(file, group=None, choose=None):
 
     Parameters
     ----------
-    file : path or file object
+    file : path, file object, or h5py.File that is open
     group : str or None
         None: the root.
     choose : callable or None
@@ -32,12 +34,11 @@ def read_group_at_once(file, group=None, choose=None):
     OSError, RuntimeError, ValueError, AttributeError
         From the libraries, for a damaged file.
     """
-    import h5py
     import xarray as xr
 
-    attributes, declared, lengths = _declared(file, group)
     variables = {}
-    with h5py.File(file, "r") as content:
+    with _opened(file) as content:
+        attributes, declared, lengths = _declared(content, group)
         stored = content[group or "/"]
         for name, (dimensions, _) in declared.items():
             for dimension, length in zip(dimensions, stored[name].shape, strict=True):
@@ -49,6 +50,12 @@ def read_group_at_once(file, group=None, choose=None):
             variables[name] = _variable(stored[name], dimensions, about, lengths, rows)
     dataset = xr.decode_cf(xr.Dataset(variables, attrs=attributes), decode_times=False)
     return dataset.set_coords("time") if isinstance(rows, int) else dataset
+
+
+def _opened(file):
+    import h5py
+
+    return contextlib.nullcontext(file) if isinstance(file, h5py.File) else h5py.File(file, "r")
 
 
 def _declared(file, group):

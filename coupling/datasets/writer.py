@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import math
 import time as clock
@@ -9,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from coupling.datasets.additions import CHECKED_FORMAT, append_to, write_attributes
+from coupling.datasets.additions import CHECKED_FORMAT, append_to
 from coupling.datasets.geometry import geometry_attributes
+from coupling.datasets.open_run import OpenRun
 from coupling.datasets.schema import (
     BALANCES,
     DT_LIMITS,
@@ -67,13 +69,14 @@ class RunWriter:
         """
         writer = cls.__new__(cls)
         writer._start(path, scene, records, snapshots)
-        write_attributes(path, status="running", status_message="", **attributes)
+        writer.attributes = {"status": "running", "status_message": "", **attributes}
         return writer
 
     def _start(self, path, scene, records, snapshots):
         self.path = Path(path)
         self._waiting, self._last_write = [], -math.inf
         self._weights = {}
+        self.attributes = {}  # of the root, written with the next batch
         self._count, self._snapshots = records, snapshots
         self._n_tunnels = len(scene.tunnels)
         kinds = {scene.lining_of(tunnel) for tunnel in scene.tunnels}
@@ -92,25 +95,48 @@ class RunWriter:
 
     def flush(self):
         """Write what waits."""
-        if not self._waiting:
-            return
+        if self._waiting:
+            with self._written_batch():
+                pass
+
+    def close(self, status, message="", judged=None, **attributes):
+        """Write what waits and how the run ended, and return the pressures on the lining.
+
+        Parameters
+        ----------
+        status : {"finished", "failed", "interrupted"}
+        message : str
+        judged : callable, optional
+            Takes the whole `/history` and gives more attributes.
+        **attributes
+            Root attributes to set.
+        """
+        with self._written_batch() as (file, content):
+            run = OpenRun(self.path, content)
+            if judged is not None:
+                attributes |= judged(run.group("history"))
+            file.attrs.update({"status": status, "status_message": message, **attributes})
+            return run.group("lining")
+
+    @contextlib.contextmanager
+    def _written_batch(self):
+        """Write what waits, and attributes that wait, with what else the block writes."""
         batch = list(self._waiting)
         snapshots = [record for record in batch if record.points is not None]
-        with append_to(self.path) as file:
+        with append_to(self.path) as (file, content):
+            file.attrs.update(self.attributes)
             if snapshots:
                 self._write_points(file["points"], snapshots)
-            self._write_lining(file["lining"], batch)
-            self._write_history(file["history"], batch)
+            if batch:
+                self._write_lining(file["lining"], batch)
+                self._write_history(file["history"], batch)
+            yield file, content
         # only now: a write that Ctrl-C cut short is repeated in the same rows
         del self._waiting[: len(batch)]
+        self.attributes = {}
         self._count += len(batch)
         self._snapshots += len(snapshots)
         self._last_write = clock.monotonic()
-
-    def close(self, status, message="", **attributes):
-        """Write what waits and how the run ended: 'finished', 'failed' or 'interrupted'."""
-        self.flush()
-        write_attributes(self.path, status=status, status_message=message, **attributes)
 
     def _create(self, attributes, geometry, mesh):
         import h5netcdf

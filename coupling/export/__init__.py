@@ -6,7 +6,7 @@ import contextlib
 import fnmatch
 from pathlib import Path
 
-from coupling.datasets import RunFileError, read_mesh, read_points, read_run, run_file
+from coupling.datasets import RunFileError, opened, read_mesh, read_points, read_run
 from coupling.export.animation import animation
 from coupling.export.grids import mesh_grids, point_grid, ring_series
 from coupling.files.folder import FIELDS
@@ -47,14 +47,18 @@ def export(run: str | Path, kind: str, out: str | Path | None = None) -> list[Pa
     """
     if kind not in FILES:
         raise Refused(f"export: format must be one of {', '.join(FILES)}, got '{kind}'")
-    file = run_file(run)
+    with opened(run) as file:
+        return _exported(file, kind, out)
+
+
+def _exported(file, kind, out):
     points = read_points(file)
     if "x" not in points or not points.sizes.get("time"):
         raise RunFileError(
-            f"run file '{file}': holds no snapshot of the points, nothing can be exported; did the "
+            f"run file '{file.path}': holds no snapshot of the points, nothing can be exported; did the "
             "scene say output.points = false, or is the run at its beginning?"
         )
-    folder = _prepared(file.parent / FIELDS if out is None else Path(out), kind)
+    folder = _prepared(file.path.parent / FIELDS if out is None else Path(out), kind)
     if kind == "gif":
         return [animation(points, folder / "gushing.gif")]
     write = _write_vtu if kind == "vtu" else _write_xdmf

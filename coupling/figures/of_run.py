@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from coupling.datasets import RunFileError, read_history, read_mesh, read_points, read_pressures, read_response
+from coupling.datasets import RunFileError, opened, read_history, read_mesh, read_points, read_pressures, read_response
 from coupling.datasets.geometry import has_tunnels, tunnels_beside
 from coupling.figures.ground import fields_around_tunnel, mesh_near_gate
 from coupling.figures.history import inflow
 from coupling.figures.picture import RESOLUTION
 from coupling.figures.ring import deformed_ring, internal_forces, pressures_polar
 
+if TYPE_CHECKING:
+    from coupling.datasets.open_run import Run
 
-def draw_run(run: str | Path, folder: str | Path) -> list[Path]:
+
+def draw_run(run: Run, folder: str | Path) -> list[Path]:
     """Draw every picture a run has data for, as PNG.
 
     Parameters
     ----------
-    run : str or path
-        Run folder or file.
+    run : str, path or OpenRun
+        Run folder or file, or one that is open.
     folder : str or path
         Where the pictures go; made when absent.
 
@@ -28,49 +33,26 @@ def draw_run(run: str | Path, folder: str | Path) -> list[Path]:
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    sources = {
-        "mesh": (mesh_near_gate, lambda: read_mesh(run)),
-        "fields": (fields_around_tunnel, lambda: read_points(run, -1)),
-        "pressures": (pressures_polar, lambda: read_pressures(run)),
-        "internal_forces": (internal_forces, lambda: read_response(run)),
-        "deformed_ring": (deformed_ring, lambda: read_response(run)),
-        "inflow": (inflow, lambda: read_history(run)),
-    }
-    pressures = read_pressures(run)
-    lined = has_tunnels(pressures)
-    for tunnel in tunnels_beside(pressures):
-        sources |= _of_tunnel(run, tunnel)
     written = []
-    for name, (draw, read) in sources.items():
-        if not lined and name != "inflow":
-            continue
-        try:
-            dataset = read()
-        except RunFileError:
-            if name.startswith(("internal_forces", "deformed_ring", "fields")):
-                continue  # a scene without a ring has no response, and one may keep no points
-            raise
-        path = folder / f"{name}.png"
-        draw(dataset).savefig(path, dpi=RESOLUTION)
-        written.append(path)
+    with opened(run) as file:
+        for name, picture in _pictures(file):
+            written.append(folder / f"{name}.png")
+            picture.savefig(written[-1], dpi=RESOLUTION)
     return written
 
 
-def _of_tunnel(run, tunnel):
-    """Pictures of a tunnel without the gate: name to what draws and what reads it."""
-
-    def pressures(dataset):
-        return pressures_polar(dataset, tunnel=tunnel)
-
-    def response():
-        return read_response(run, tunnel=tunnel)
-
-    def fields(points):
-        return fields_around_tunnel(points, tunnel=tunnel)
-
-    return {
-        f"fields_tunnel_{tunnel}": (fields, lambda: read_points(run, -1)),
-        f"pressures_tunnel_{tunnel}": (pressures, lambda: read_pressures(run)),
-        f"internal_forces_tunnel_{tunnel}": (internal_forces, response),
-        f"deformed_ring_tunnel_{tunnel}": (deformed_ring, response),
-    }
+def _pictures(run):
+    """Names and pictures."""
+    pressures = read_pressures(run)
+    if has_tunnels(pressures):
+        yield "mesh", mesh_near_gate(read_mesh(run))
+        for tunnel in (None, *tunnels_beside(pressures)):
+            end = "" if tunnel is None else f"_tunnel_{tunnel}"
+            with contextlib.suppress(RunFileError):  # a scene may keep no points
+                yield f"fields{end}", fields_around_tunnel(read_points(run, -1), tunnel=tunnel)
+            yield f"pressures{end}", pressures_polar(pressures, tunnel=tunnel)
+            with contextlib.suppress(RunFileError):  # a scene without a ring has no response
+                response = read_response(run, tunnel=tunnel)
+                yield f"internal_forces{end}", internal_forces(response)
+                yield f"deformed_ring{end}", deformed_ring(response)
+    yield "inflow", inflow(read_history(run))

@@ -52,7 +52,7 @@ def write_checkpoint(folder, state, about):
     body = image.getbuffer()[BLOCK:]
     title = f"{TITLE}{hashlib.sha256(body).hexdigest()}\n".encode().ljust(BLOCK, b"\0")
     path = Path(folder) / f"checkpoint-{int(state['step_count']):010d}.h5"
-    replace_file(path, [title, body])
+    replace_file(path, title, body)
     for old in checkpoints(folder)[KEPT:]:
         old.unlink(missing_ok=True)
     return path

@@ -91,6 +91,8 @@ def reopened(folder):
 def _locked(folder):
     lock = _lock(folder)
     try:
+        for left in folder.glob("*.tmp"):  # of a process that was killed, see `coupling.files.replace`
+            left.unlink(missing_ok=True)
         yield
     finally:
         with contextlib.suppress(OSError):

@@ -5,12 +5,13 @@ class ForeignContent(ValueError):
     """A file that shows the content of other files as its own."""
 
 
-def require_own_content(file):
+def require_own_content(group):
     """Refuse external links, external storage and virtual datasets; a damaged file raises what the library raises.
 
     Parameters
     ----------
-    file : path or file object
+    group : h5py.File or h5py.Group
+        Open; nothing of it has been read yet.
 
     Raises
     ------
@@ -18,13 +19,6 @@ def require_own_content(file):
     OSError, KeyError, RuntimeError, ValueError
         From the library.
     """
-    import h5py
-
-    with h5py.File(file, "r") as content:
-        _require(content)
-
-
-def _require(group):
     import h5py
 
     for name in group:
@@ -35,6 +29,6 @@ def _require(group):
             raise ForeignContent(f"'{group.name}/{name}' is a link to '{link.path}'")  # nothing here writes one
         entry = group[name]
         if isinstance(entry, h5py.Group):
-            _require(entry)
+            require_own_content(entry)
         elif isinstance(entry, h5py.Dataset) and (entry.external or entry.is_virtual):
             raise ForeignContent(f"'{entry.name}' has its values in other files")

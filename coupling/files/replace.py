@@ -5,6 +5,35 @@ import os
 from pathlib import Path
 
 
+@contextlib.contextmanager
+def replaced(path, lasting=True):
+    """Yield the path of a new file beside `path`, which takes its place in one go when the block ends.
+
+    An exception inside leaves `path` as it was, and nothing beside it. `lasting`: also safe from a power cut.
+    """
+    path = Path(path)
+    beside = path.with_name(f"{path.name}.{os.getpid()}.tmp")
+    try:
+        yield beside
+        if lasting:
+            with open(beside, "rb") as file:
+                os.fsync(file.fileno())
+        os.replace(beside, path)
+        if lasting:
+            synchronise(path.parent)
+    finally:
+        with contextlib.suppress(OSError):
+            beside.unlink()
+
+
+def replace_file(path, *parts, lasting=True):
+    """Put a file of these bytes or texts in the place of `path`, see :func:`replaced`."""
+    with replaced(path, lasting) as beside:
+        with open(beside, "wb") as file:
+            for part in parts:
+                file.write(part.encode() if isinstance(part, str) else part)
+
+
 def synchronise(folder):
     """Make new, renamed and removed names in a folder last."""
     handle = os.open(folder, os.O_RDONLY)
@@ -12,26 +41,3 @@ def synchronise(folder):
         os.fsync(handle)
     finally:
         os.close(handle)
-
-
-def replace_file(path, data):
-    """Write bytes to a file beside `path`, make them last, and put it in the place of `path` in one go."""
-    path = Path(path)
-    beside = path.with_name(f"{path.name}.tmp")
-    try:
-        with open(beside, "wb") as file:
-            for part in [data] if isinstance(data, bytes | memoryview) else data:
-                file.write(part)
-        put_in_place(beside, path)
-    except OSError:
-        with contextlib.suppress(OSError):
-            beside.unlink()
-        raise
-
-
-def put_in_place(beside, path):
-    """Make a new file last, and put it in the place of `path` in one go."""
-    with open(beside, "rb") as file:
-        os.fsync(file.fileno())
-    os.replace(beside, path)
-    synchronise(Path(path).parent)

@@ -112,8 +112,13 @@ def quality(history: xr.Dataset, response: xr.Dataset | None = None) -> dict[str
         "clamps": clamps,
     }
     if response is not None and "equilibrium_residual" in response:
-        result["lining_equilibrium"] = float(np.abs(response["equilibrium_residual"].values).max())
+        result["lining_equilibrium"] = lining_equilibrium(response)
     return result
+
+
+def lining_equilibrium(response: xr.Dataset) -> float:
+    """Largest unbalanced force of a lining model's answer over its loads [-]."""
+    return float(np.abs(response["equilibrium_residual"].values).max())
 
 
 def verdicts(values: Mapping[str, Any]) -> dict[str, str]:

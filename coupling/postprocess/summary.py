@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from coupling.datasets import read_attributes, read_history, read_pressures
+from coupling.datasets import opened, read_attributes, read_history, read_pressures
 from coupling.datasets.geometry import on_tunnel, tunnels_beside
-from coupling.postprocess.quality import quality, verdicts
+from coupling.postprocess.quality import lining_equilibrium, quality, verdicts
 from mpm.variables import CLAMPS
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from coupling.datasets.open_run import Run
+
 PLACES = {"crown": 0, "right waist": 90, "invert": 180, "left waist": 270}
 
 
-def summarise_run(run: str | Path) -> dict[str, Any]:
+def summarise_run(run: Run) -> dict[str, Any]:
     """Numbers of a run for people and programs.
 
     Returns
@@ -31,7 +32,8 @@ def summarise_run(run: str | Path) -> dict[str, Any]:
         place to {initial, final}, of the tunnel with the gate; tunnels: number of any other to the same two and
         `response`, None.
     """
-    attributes, history, pressures = read_attributes(run), read_history(run), read_pressures(run)
+    with opened(run) as file:
+        attributes, history, pressures = read_attributes(file), read_history(file), read_pressures(file)
     data = {
         "scene": attributes["scene_name"],
         "status": attributes["status"],
@@ -106,5 +108,5 @@ def summarise_response(response: xr.Dataset) -> dict[str, Any]:
             }
     for name in ("joint_opening", "joint_dislocation", "joint_rotation"):
         data[name] = {state: record[name].values.tolist() for state, record in states.items()}
-    data["equilibrium_residual"] = float(np.abs(response["equilibrium_residual"].values).max())
+    data["equilibrium_residual"] = lining_equilibrium(response)
     return data

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import os
-import tempfile
 from importlib import resources
 from pathlib import Path
 
 from coupling.datasets import run_file
 from coupling.files.folder import REPORT_FILE, RUN_FILE
+from coupling.files.replace import replace_file
 from coupling.refused import Refused
 from coupling.report.frame import document
 
@@ -55,10 +54,7 @@ def write_report(path: str | Path, out: str | Path | None = None, model: str | N
         target = _checked_path(folder, out)
         data, parts, scripts = study_page.collect(folder, target.parent, model), study_markup.parts, study_page.SCRIPTS
     text = document(*parts(data), data["player"], _file("page.css"), "\n".join(map(_file, scripts)), MARK)
-    with tempfile.NamedTemporaryFile("w", dir=target.parent, suffix=".html", delete=False, encoding="utf-8") as stream:
-        stream.write(text)
-    os.chmod(stream.name, 0o644)
-    os.replace(stream.name, target)
+    replace_file(target, text)
     return target
 
 

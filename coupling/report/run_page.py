@@ -2,7 +2,7 @@
 
 import xarray as xr
 
-from coupling.datasets import RunFileError, identifier, read_run, run_file, structure_group
+from coupling.datasets import RunFileError, identifier, opened, read_run, structure_group
 from coupling.datasets.geometry import tunnels_beside
 from coupling.datasets.tree import model_names
 from coupling.postprocess.summary import summarise_run
@@ -35,13 +35,15 @@ def collect(run, model=None):
         attributes, summary, numbers, quality, warnings, notes, facts, left_out: for the text; player: what the script
         draws, JSON.
     """
-    tree = _led_by(read_run(run), model)
+    with opened(run) as file:
+        tree = _led_by(read_run(file), model)
+        if "history" not in tree.children or "lining" not in tree.children:
+            raise RunFileError(f"run file '{file.path}': it holds no run; give the folder that `gush run` wrote")
+        if not min(tree["lining"].sizes["time"], tree["history"].sizes["time"]):
+            raise RunFileError(f"run file '{file.path}': has no complete record yet; wait for the first one")
+        summary = summarise_run(file)
     attributes = {name: _plain(value) for name, value in tree.attrs.items()}
-    if "history" not in tree.children or "lining" not in tree.children:
-        raise RunFileError(f"run file '{run_file(run)}': it holds no run; give the folder that `gush run` wrote")
-    if not min(tree["lining"].sizes["time"], tree["history"].sizes["time"]):
-        raise RunFileError(f"run file '{run_file(run)}': has no complete record yet; wait for the first one")
-    scene, summary = read_scene(attributes), summarise_run(run)
+    scene = read_scene(attributes)
     quality_rows = quality(tree, summary, scene)
     frames = choose_frames(tree)
     fields = field_snapshots(tree["points"].to_dataset()) if "points" in tree.children else None

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coupling.datasets import read_pressures, write_response
-from coupling.datasets.geometry import on_tunnel
-from coupling.files.folder import RUN_FILE
+from coupling.datasets.geometry import on_tunnel, tunnels_beside
 from coupling.refused import Refused, SceneError
 from coupling.scenes.rings import gate_tunnel, ring_of
 from structure.models import model_name
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import xarray as xr
 
     from coupling.scenes.scene import Scene
@@ -40,15 +39,12 @@ def respond(scene: Scene, pressures: xr.Dataset, backend: str = "beam-spring", t
     return respond_by_name(ring, pressures, backend)
 
 
-def respond_beside(scene: Scene, folder: Path, backend: str = "beam-spring") -> list[int]:
-    """Store the responses of the tunnels without the gate, each of its own ring; returns their numbers."""
-    if scene.ring is None:
-        return []
-    others = [k for k in range(len(scene.mpm.tunnels)) if k != gate_tunnel(scene.mpm)]
-    for k in others:
-        response = respond(scene, read_pressures(folder), backend, k)
-        write_response(folder / RUN_FILE, response, model_name(backend), tunnel=k)
-    return others
+def responses_on(
+    scene: Scene, pressures: xr.Dataset, backend: str = "beam-spring"
+) -> Iterator[tuple[tuple[str, int | None], xr.Dataset]]:
+    """Responses of all tunnels, each of its own ring: (model, tunnel as of :func:`respond`) and response."""
+    for tunnel in (None, *tunnels_beside(pressures)):
+        yield (model_name(backend), tunnel), respond(scene, pressures, backend, tunnel)
 
 
 def respond_by_name(ring: Ring, pressures: xr.Dataset, backend: str, **options: Any) -> xr.Dataset:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from pydantic import ValidationError
 
-from coupling.datasets import RunFileError, read_group, run_file
+from coupling.datasets import RunFileError, opened, run_file
 from coupling.datasets.geometry import on_tunnel, tunnels_beside
 
 
@@ -56,9 +56,10 @@ def read_sources(path, scene=None):
     from coupling.scenes.scene import load_scene, parse_scene
 
     file = run_file(path)
-    root = read_group(file, None)
-    is_run = _has_lining(file)
-    pressures = read_group(file, "lining") if is_run else root
+    with opened(file) as run:
+        is_run = "lining" in run.names()
+        root = run.group(None)
+        pressures = run.group("lining") if is_run else root
     chosen = own = None
     if "scene" in root.attrs:
         try:
@@ -89,13 +90,6 @@ def _source(file, is_run, pressures, root, own, chosen, tunnel):
         raise RunFileError(f"'{file}': {problem}") from problem
     is_own = is_run and own is not None and own.ring is not None and _ring(file, root, own, tunnel) == ring
     return Source(file, is_own, checked, ring, tunnel)
-
-
-def _has_lining(file):
-    import h5netcdf
-
-    with h5netcdf.File(file, "r") as content:
-        return "lining" in content.groups
 
 
 def _ring(file, root, scene, tunnel):

@@ -9,12 +9,12 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from coupling.datasets import RunWriter, read_history, write_attributes
+from coupling.datasets import RunWriter
 from coupling.files.checkpoint import remove_checkpoints, write_checkpoint
 from coupling.files.folder import MESH_FILE, RUN_FILE, SCENE_FILE, how_to_go_on
 from coupling.files.provenance import root_attributes, with_history
 from coupling.files.replace import replace_file
-from coupling.postprocess.quality import quality, quality_attributes, quality_line, states_line
+from coupling.postprocess.quality import quality, quality_attributes, states_line
 from coupling.refused import Refused
 from coupling.runs.stop_signals import stop_signals
 
@@ -54,7 +54,9 @@ class RecordedSimulation:
         self._begin = clock.monotonic(), clock.process_time()
 
     def run(self):
-        """Simulate to the end; whatever stops it, what was computed stays readable and the run can be continued.
+        """Simulate to the end and return the pressures on the lining.
+
+        Whatever stops it, what was computed stays readable and the run can be continued.
 
         Raises
         ------
@@ -85,13 +87,14 @@ class RecordedSimulation:
             log.exception("failed")
             self._close_if_possible(f"{type(error).__name__}: {error}", "failed")
             raise
-        self._close("finished")
+        pressures = self._close("finished")
         remove_checkpoints(self.folder)
         log.info("finished in %.1f s", clock.monotonic() - self._begin[0])
         if asked is not None:
             interrupt = KeyboardInterrupt(asked)
             interrupt.add_note(f"the simulation is finished; ring response and pictures: {how_to_go_on(self.folder)}")
             raise interrupt
+        return pressures
 
     def _prepare(self):
         """Mesh, run file, and the simulation at its initial state or at its last checkpoint."""
@@ -99,7 +102,7 @@ class RecordedSimulation:
 
         attributes, scene = self.attributes, self.scene
         log.info("scene %s, %s, revision %s", scene.name, attributes["source"], attributes["revision"] or "unknown")
-        replace_file(self.folder / SCENE_FILE, attributes["scene"].encode())
+        replace_file(self.folder / SCENE_FILE, attributes["scene"])
         self.report({"stage": "mesh"})
         mesh = mpm.build_mesh(scene.mpm)
         mesh.save(self.folder / MESH_FILE)
@@ -138,7 +141,7 @@ class RecordedSimulation:
     def _note_slip(self):
         """Store and tell what of the bonded initial state the lining's friction does not bear."""
         share, scene = self.simulation.unborne_shear, self.scene.mpm
-        write_attributes(self.folder / RUN_FILE, initial_unborne_shear=share)
+        self.writer.attributes["initial_unborne_shear"] = share
         if share > MOST_UNBORNE:
             asked = max(scene.bond_friction(tunnel) for tunnel in scene.tunnels)
             rougher = f"give a coefficient of {math.ceil(100 * asked) / 100:g} or more, or " if asked <= 2 else ""
@@ -195,9 +198,9 @@ class RecordedSimulation:
         return {name: value + self._used_before[name] for name, value in used.items()}
 
     def _close(self, status, message=""):
-        if self.writer is not None:
-            self.writer.close(status, message, **self._used())
-            write_quality(self.folder / RUN_FILE)
+        if self.writer is None:
+            return None
+        return self.writer.close(status, message, _judged, **self._used())
 
     def _close_if_possible(self, message, status="interrupted"):
         try:
@@ -206,16 +209,13 @@ class RecordedSimulation:
             log.warning("the end could not be written: %s", error)
 
 
-def write_quality(file, response=None):
-    """Store the errors of a run with it, and return them; {} without a record."""
-    history = read_history(file)
-    values = {}
-    if history.sizes["time"]:
-        values = quality(history, response)
-        write_attributes(file, **quality_attributes(values))
-        log.info("errors: %s", quality_line(values))
-        log.info("states: %s", states_line(values))
-    return values
+def _judged(history):
+    """Errors of a run as its attributes, {} without a record; its states are told to the log."""
+    if not history.sizes["time"]:
+        return {}
+    values = quality(history)
+    log.info("states: %s", states_line(values))
+    return quality_attributes(values)
 
 
 def mesh_sha256(mesh):

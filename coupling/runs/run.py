@@ -10,15 +10,21 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coupling.datasets import read_attributes, read_pressures, write_response
+from coupling.datasets import opened, read_attributes, read_pressures, write_responses
 from coupling.files.checkpoint import remove_checkpoints
 from coupling.files.folder import FIGURES, LOG_FILE, RUN_FILE, claimed, default_folder, reopened
-from coupling.postprocess.quality import poor_errors, stored_quality
+from coupling.postprocess.quality import (
+    lining_equilibrium,
+    poor_errors,
+    quality_attributes,
+    quality_line,
+    stored_quality,
+)
 from coupling.refused import Refused
-from coupling.responses.respond import respond, respond_beside
+from coupling.responses.respond import responses_on
 from coupling.runs.memory import check_memory
 from coupling.runs.progress_line import ProgressLine, in_notebook
-from coupling.runs.recorded_simulation import RecordedSimulation, write_quality
+from coupling.runs.recorded_simulation import RecordedSimulation
 from coupling.runs.resume import find_remains
 from coupling.scenes.plausibility import warn_in_python, warnings_of
 from coupling.scenes.scene import as_scene
@@ -116,14 +122,32 @@ def run(
                 _teller(warn)(warning)
         if remains is not None and remains.finished:
             remove_checkpoints(folder)
+            pressures = read_pressures(folder)
         else:
-            RecordedSimulation(chosen, folder, report, threads, checkpoint_interval, remains, _teller(warn)).run()
-        try:
-            finish(chosen, folder, report, figures if response is None else response, figures)
-        finally:
-            for warning in poor_errors(stored_quality(read_attributes(folder))):
-                _teller(warn)(warning)
-        pressures = read_pressures(folder)
+            simulation = RecordedSimulation(
+                chosen, folder, report, threads, checkpoint_interval, remains, _teller(warn)
+            )
+            pressures = simulation.run()
+        failure = None
+        if (figures if response is None else response) and chosen.ring is not None and chosen.mpm.tunnels:
+            report({"stage": "respond"})
+            failure = _answered(chosen, folder / RUN_FILE, pressures)
+        with opened(folder) as file:
+            try:
+                if figures:
+                    from coupling.figures import draw_run
+
+                    report({"stage": "figures"})
+                    draw_run(file, folder / FIGURES)
+            finally:
+                errors = stored_quality(read_attributes(file))
+                log.info("errors: %s", quality_line(errors))
+                for warning in poor_errors(errors):
+                    _teller(warn)(warning)
+        if failure is not None:
+            drawn = " and drawn" if figures else ""
+            failure.add_note(f"the ground is computed{drawn} in {folder}; change the ring, then: gush respond {folder}")
+            raise failure
     pressures.attrs |= {"run": str(folder), "scene_name": chosen.name}
     return pressures
 
@@ -160,40 +184,23 @@ def _shown(progress):
     return ProgressLine(quiet=not (in_notebook() if progress is None else progress))
 
 
-def finish(
-    scene: Scene, folder: Path, progress: Callable[[dict[str, Any]], None], response: bool = True, figures: bool = True
-) -> list[Path]:
-    """Response of the ring to a run's pressures and all pictures, where asked for; returns the paths of the pictures.
-
-    Raises
-    ------
-    Refused, structure.LiningFailure
-        As :func:`respond`, after the pictures of the ground have been drawn.
-    """
+def _answered(scene, file, pressures):
+    """Store the responses of the rings; returns what refused or failed, None for nothing."""
     from structure import LiningFailure
 
-    failure = None
-    if response and scene.ring is not None and scene.mpm.tunnels:
-        progress({"stage": "respond"})
-        try:
-            answer = respond(scene, read_pressures(folder))
-            write_response(folder / RUN_FILE, answer)
-            write_quality(folder / RUN_FILE, answer)
-            respond_beside(scene, folder)
-        except (Refused, LiningFailure) as problem:
-            log.error("no response of the ring: %s", problem)
-            failure = problem
-    pictures = []
-    if figures:
-        from coupling.figures import draw_run
-
-        progress({"stage": "figures"})
-        pictures = draw_run(folder, folder / FIGURES)
-    if failure is not None:
-        drawn = " and drawn" if figures else ""
-        failure.add_note(f"the ground is computed{drawn} in {folder}; change the ring, then: gush respond {folder}")
-        raise failure
-    return pictures
+    answers, failure, attributes = {}, None, {}
+    try:
+        for key, response in responses_on(scene, pressures):
+            answers[key] = response
+    except (Refused, LiningFailure) as problem:
+        log.error("no response of the ring: %s", problem)
+        failure = problem
+    for (_, tunnel), response in answers.items():
+        if tunnel is None:
+            attributes = quality_attributes({"lining_equilibrium": lining_equilibrium(response)})
+    if answers:
+        write_responses(file, answers, **attributes)
+    return failure
 
 
 @contextlib.contextmanager

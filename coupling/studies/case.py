@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -41,12 +40,13 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, 
         As :func:`coupling.run`; the study goes on without the case.
     """
 
-    from coupling.datasets import read_history, read_pressures, write_response
+    from coupling.datasets import read_history, read_pressures, write_responses
     from coupling.datasets.geometry import on_tunnel
     from coupling.files.folder import RUN_FILE
     from coupling.files.provenance import root_attributes
+    from coupling.files.replace import replaced
     from coupling.refused import Refused
-    from coupling.responses.respond import respond, respond_beside
+    from coupling.responses.respond import responses_on
     from coupling.runs.run import run
     from coupling.scenes.scene import parse_scene
     from coupling.studies.progress import CaseProgress
@@ -70,18 +70,17 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, 
         run(scene, run_folder, overwrite=True, threads=threads, progress=report)
     report({"stage": "respond"})
     pressures, history = read_pressures(run_folder), read_history(run_folder)
-    pressures = on_tunnel(pressures)
-    responses = {}
+    answers, responses = {}, {}
     for name, backend in models.items():
-        responses[name] = respond(scene, pressures, backend)
-        write_response(run_folder / RUN_FILE, responses[name], name)
-        respond_beside(scene, run_folder, backend)
+        answers |= responses_on(scene, pressures, backend)
+        responses[name] = answers[name, None]
+    if answers:
+        write_responses(run_folder / RUN_FILE, answers)
     last = scene.mpm.stop.inflow_mass or float(history["inflow_mass"].values[-1])
-    result = at_inflow_masses(pressures, history, responses, np.linspace(0.0, last, records))
+    result = at_inflow_masses(on_tunnel(pressures), history, responses, np.linspace(0.0, last, records))
     result.attrs = root_attributes(scene)
-    waiting = place / f"{CASE_FILE}.{os.getpid()}"
-    result.to_netcdf(waiting, engine="h5netcdf")
-    waiting.replace(done)
+    with replaced(done) as beside:
+        result.to_netcdf(beside, engine="h5netcdf")
     report.end()
     return str(done)
 

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from coupling.files.replace import replace_file
 from coupling.studies.case import CASE_FILE, run_case
 from coupling.studies.design import Case, Study, StudyError, cases, check_backends, load_study
 from coupling.studies.progress import StudyState, watching
@@ -233,6 +234,4 @@ def _text(failure):
 
 
 def _write_json(path: Path, data: Any):
-    waiting = path.with_suffix(f".{os.getpid()}")
-    waiting.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
-    waiting.replace(path)
+    replace_file(path, json.dumps(data, indent=1) + "\n")

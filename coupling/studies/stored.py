@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from coupling.files.replace import replaced
 from structure.models import model_name
 
 #: Keys of a case's result.
@@ -31,9 +32,8 @@ def run_study(name, out, workers, scheduler, console):
     folder = Path(out) if out is not None else Path("studies") / plan.name
     with StudyLine(console) as line:
         dataset = study(plan, folder, workers, scheduler, partial(console.print, highlight=False, soft_wrap=True), line)
-    waiting = folder / f"{DATA_FILE}.new"
-    dataset.to_netcdf(waiting, engine="h5netcdf")
-    waiting.replace(folder / DATA_FILE)
+    with replaced(folder / DATA_FILE) as beside:
+        dataset.to_netcdf(beside, engine="h5netcdf")
     rows = []
     for case in cases(plan):
         one = dataset.sel(case=case.index)
