@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from structure.inputs import GushingWarning, shortened
+from structure.response import PRESSURES
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from structure.ring import Ring
 
-PRESSURES = ("soil_pressure", "water_pressure", "soil_shear")
 FEWEST_ANGLES = 8
 #: Between angles pressures are linear: what lies in a wider gap is not known [degree].
 WIDEST_GAP = 60.0

@@ -1,7 +1,7 @@
 """Capacity of a reinforced concrete segment under axial force and bending: EN 1992-1-1, parabola-rectangle diagram.
 
 A rectangular section one metre wide (per metre of tunnel), one layer of steel near each face. Strains here are positive
-in compression; N and M have the signs of :mod:`structure.lining`, so M > 0 compresses the inner face.
+in compression; N and M have the signs of :mod:`structure.response`, so M > 0 compresses the inner face.
 """
 
 from __future__ import annotations

@@ -5,20 +5,12 @@ import numpy as np
 from matplotlib.lines import Line2D
 
 from coupling.figures.picture import STYLE, Picture
-from coupling.figures.polar import at_time, closed_curve, crown_up, legend_below, radial_ticks
+from coupling.figures.polar import around_zero, at_time, closed_curve, crown_up, legend_below
+from structure.response import FORCES, SHOWN
 
 COLOURS, DASHES = ("0.25", "#c1272d"), ("-", (0, (4, 2)))
 MOST_JOINTS_NAMED = 8
-PANELS = (
-    ("axial_force", "axial force N [kN/m]"),
-    ("shear_force", "shear force Q [kN/m]"),
-    ("bending_moment", "bending moment M [kN m/m]"),
-)
-JOINTS = (
-    ("joint_opening", "opening (+) or closing (\N{MINUS SIGN}) [mm]"),
-    ("joint_dislocation", "dislocation [mm]"),
-    ("joint_rotation", "rotation [mrad]"),
-)
+JOINTS = ("joint_opening", "joint_dislocation", "joint_rotation")
 
 
 def forces_compared(responses):
@@ -35,28 +27,21 @@ def forces_compared(responses):
         figure = Picture(figsize=(7.4, 3.0 * len(times) + 0.2), layout="constrained")
         axes = figure.subplots(len(times), 3, subplot_kw={"projection": "polar"}, squeeze=False)
         for row, time in zip(axes, times, strict=True):
-            for axis, (name, title) in zip(row, PANELS, strict=True):
+            for axis, name in zip(row, FORCES, strict=True):
                 _forces_panel(axis, responses, name, time)
-                axis.set_title(f"{title}\n{at_time(one.isel(time=time))}", pad=10)
+                axis.set_title(f"{SHOWN[name].label}\n{at_time(one.isel(time=time))}", pad=10)
         legend_below(figure, axes[0, 0])
     return figure
 
 
 def _forces_panel(axis, responses, name, time):
     crown_up(axis)
-    curves = {model: response[name].isel(time=time) / 1e3 for model, response in responses.items()}
-    low = min(0.0, *(float(curve.min()) for curve in curves.values()))
-    high = max(0.0, *(float(curve.max()) for curve in curves.values()))
+    curves = {model: SHOWN[name].scale * response[name].isel(time=time) for model, response in responses.items()}
     for (model, curve), colour, dash in zip(curves.items(), COLOURS, DASHES, strict=False):
         angle = np.radians(curve["theta"].values)
         axis.plot(*closed_curve(angle, curve.values), color=colour, ls=dash, lw=1.1, label=model)
     axis.plot(np.linspace(0, 2 * np.pi, 181), np.zeros(181), color="0.2", lw=0.6)
-    margin = 0.08 * max(high - low, 1e-3)
-    axis.set_ylim(low - margin * (low < 0), high + margin)
-    if low < 0:
-        # the middle stays free, so that the zero line is a circle wide enough to read along
-        axis.set_rorigin(low - margin - 0.5 * (high - low))
-    radial_ticks(axis, None, 4)
+    around_zero(axis, *curves.values())
 
 
 def joints_compared(responses):
@@ -75,12 +60,19 @@ def joints_compared(responses):
     with matplotlib.rc_context(STYLE):
         figure = Picture(figsize=(7.4, 3.2), layout="constrained")
         axes = figure.subplots(1, 3)
-        for axis, (name, title) in zip(axes, JOINTS, strict=True):
+        for axis, name in zip(axes, JOINTS, strict=True):
             for response, dash in zip(responses.values(), DASHES, strict=False):
                 for k, colour in enumerate(colours):
                     marker = "o" if len(abscissa) == 1 else None
-                    axis.plot(abscissa, 1e3 * response[name].values[:, k], color=colour, ls=dash, marker=marker, ms=3)
-            axis.set_title(title)
+                    axis.plot(
+                        abscissa,
+                        SHOWN[name].scale * response[name].values[:, k],
+                        color=colour,
+                        ls=dash,
+                        marker=marker,
+                        ms=3,
+                    )
+            axis.set_title(SHOWN[name].label)
             axis.set_xlabel("inflow mass [kg/m]" if mass else "time [s]")
             axis.grid(True)
         handles = [

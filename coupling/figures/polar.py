@@ -24,6 +24,16 @@ def radial_ticks(axis, gate, count=5):
         label.set_bbox({"fc": "white", "ec": "none", "alpha": 0.75, "pad": 0.4})
 
 
+def around_zero(axis, *curves):
+    """Let the axis hold curves of both signs and their zero line, a circle wide enough to read along."""
+    low, high = (float(pick([0.0, *(pick(curve) for curve in curves)])) for pick in (np.min, np.max))
+    margin = 0.08 * max(high - low, 1e-3)
+    axis.set_ylim(low - margin * (low < 0), high + margin)
+    if low < 0:
+        axis.set_rorigin(low - margin - 0.5 * (high - low))
+    radial_ticks(axis, None, 4)
+
+
 def legend_below(figure, axis):
     handles, labels = axis.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))

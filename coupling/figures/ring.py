@@ -11,8 +11,10 @@ from matplotlib.patches import Annulus
 
 from coupling.datasets.geometry import gate_of, gate_tunnel, on_tunnel
 from coupling.figures.picture import GATE, INITIAL, NOW, STYLE, Picture
-from coupling.figures.polar import at_time, closed_curve, crown_up, legend_below, radial_ticks
+from coupling.figures.polar import around_zero, at_time, closed_curve, crown_up, legend_below, radial_ticks
 from coupling.figures.tunnel import mark_gate
+from coupling.postprocess.extremes import extremes
+from structure.response import FORCES, SHOWN
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,8 +39,7 @@ def pressures_polar(pressures: xr.Dataset, time: int = -1, tunnel: int | None = 
     with matplotlib.rc_context(STYLE):
         figure = Picture(figsize=(7.2, 4.0), layout="constrained")
         axes = figure.subplots(1, 2, subplot_kw={"projection": "polar"})
-        titles = {"soil_pressure": "effective soil pressure [kPa]", "water_pressure": "water pressure [kPa]"}
-        for axis, (name, title) in zip(axes, titles.items(), strict=True):
+        for axis, name in zip(axes, ("soil_pressure", "water_pressure"), strict=True):
             crown_up(axis)
             axis.plot(
                 *closed_curve(angle, first[name].values / 1e3), color=INITIAL, ls=(0, (4, 2)), lw=1.2, label="initial"
@@ -48,7 +49,7 @@ def pressures_polar(pressures: xr.Dataset, time: int = -1, tunnel: int | None = 
             radial_ticks(axis, gate_of(pressures))
             if tunnel in (None, gate_tunnel(pressures)):
                 mark_gate(axis, pressures)
-            axis.set_title(title, pad=12)
+            axis.set_title(SHOWN[name].label, pad=12)
         legend_below(figure, axes[0])
     return figure
 
@@ -65,36 +66,26 @@ def internal_forces(response: xr.Dataset, time: int = -1) -> Picture:
     """
     angle = np.radians(response["theta"].values)
     first, now = response.isel(time=0), response.isel(time=time)
-    panels = (
-        ("axial_force", "axial force N [kN/m]"),
-        ("shear_force", "shear force Q [kN/m]"),
-        ("bending_moment", "bending moment M [kN m/m]"),
-    )
+    found = extremes(now)
     with matplotlib.rc_context(STYLE):
         figure = Picture(figsize=(7.4, 3.15), layout="constrained")
         axes = figure.subplots(1, 3, subplot_kw={"projection": "polar"})
-        for axis, (name, title) in zip(axes, panels, strict=True):
+        for axis, name in zip(axes, FORCES, strict=True):
             crown_up(axis)
-            start, end = first[name].values / 1e3, now[name].values / 1e3
+            scale = SHOWN[name].scale
+            start, end = scale * first[name].values, scale * now[name].values
             axis.plot(*closed_curve(angle, np.zeros_like(angle)), color="0.2", lw=0.8)
             axis.plot(*closed_curve(angle, start), color=INITIAL, ls=(0, (4, 2)), lw=1.1, label="initial")
             axis.plot(*closed_curve(angle, end), color=NOW, label=at_time(now))
             axis.fill_between(*closed_curve(angle, end), 0.0, color=NOW, alpha=0.12, lw=0)
-            low, high = min(0.0, start.min(), end.min()), max(0.0, start.max(), end.max())
-            margin = 0.08 * max(high - low, 1e-3)
-            axis.set_ylim(low - margin * (low < 0), high + margin)
-            if low < 0:
-                # the middle stays free, so that the zero line is a circle wide enough to read along
-                axis.set_rorigin(low - margin - 0.5 * (high - low))
-            radial_ticks(axis, None, 4)
-            for value, at in ((end.max(), end.argmax()), (end.min(), end.argmin())):
-                axis.plot(angle[at], value, "o", ms=2.8, color=NOW)
-            axis.set_title(title, pad=10)
-            axis.set_xlabel(
-                f"max {end.max():.0f} at {np.degrees(angle[end.argmax()]):.4g}°,  "
-                f"min {end.min():.0f} at {np.degrees(angle[end.argmin()]):.4g}°".replace("-", "\N{MINUS SIGN}"),
-                labelpad=6,
-            )
+            around_zero(axis, start, end)
+            told = []
+            for kind in ("max", "min"):
+                value, at = scale * found[f"{name}_{kind}"].item(), found[f"{name}_{kind}_angle"].item()
+                axis.plot(np.radians(at), value, "o", ms=2.8, color=NOW)
+                told.append(f"{kind} {value:.0f} at {at:.4g}°".replace("-", "\N{MINUS SIGN}"))
+            axis.set_title(SHOWN[name].label, pad=10)
+            axis.set_xlabel(",  ".join(told), labelpad=6)
         legend_below(figure, axes[0])
     return figure
 

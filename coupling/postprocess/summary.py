@@ -8,8 +8,10 @@ import numpy as np
 
 from coupling.datasets import opened, read_attributes, read_history, read_pressures
 from coupling.datasets.geometry import on_tunnel, tunnels_beside
+from coupling.postprocess.extremes import extremes
 from coupling.postprocess.quality import lining_equilibrium, quality, verdicts
 from mpm.variables import CLAMPS
+from structure.response import FORCES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -96,15 +98,13 @@ def summarise_response(response: xr.Dataset) -> dict[str, Any]:
     """
     data = {}
     states = {"initial": response.isel(time=0), "final": response.isel(time=-1)}
-    for name in ("axial_force", "shear_force", "bending_moment"):
+    for name in FORCES:
         data[name] = {}
         for state, record in states.items():
-            values, theta = record[name].values, record["theta"].values
+            found = extremes(record, [name])
             data[name][state] = {
-                "max": float(values.max()),
-                "max_theta": float(theta[values.argmax()]),
-                "min": float(values.min()),
-                "min_theta": float(theta[values.argmin()]),
+                key: found[f"{name}_{key.replace('theta', 'angle')}"].item()
+                for key in ("max", "max_theta", "min", "min_theta")
             }
     for name in ("joint_opening", "joint_dislocation", "joint_rotation"):
         data[name] = {state: record[name].values.tolist() for state, record in states.items()}

@@ -7,6 +7,7 @@ import numpy as np
 from coupling.datasets import HISTORY, structure_group
 from coupling.datasets.geometry import gate_of, has_tunnels, on_tunnel, tunnel_of, tunnels_beside
 from coupling.datasets.tree import match_times, model_names
+from coupling.postprocess.extremes import RING_EXTREMES, ring_extremes, shown_extreme
 from coupling.postprocess.quality import ERRORS, STATES
 from coupling.postprocess.summary import PLACES
 from mpm.variables import CLAMPS
@@ -19,19 +20,6 @@ MEANINGS = {
     "porosity_floor": "held there; no sound run reaches it",
     "porosity_ceiling": "held there; no sound run reaches it",
     "returned_to_mesh": "they would have left the mesh within a step",
-}
-#: Variable and which extreme of it: (label, unit shown, factor from SI).
-RING_EXTREMES = {
-    "axial_force_max": ("axial force N, largest", "kN/m", 1e-3),
-    "axial_force_min": ("axial force N, smallest", "kN/m", 1e-3),
-    "shear_force_max": ("shear force Q, largest", "kN/m", 1e-3),
-    "shear_force_min": ("shear force Q, smallest", "kN/m", 1e-3),
-    "bending_moment_max": ("bending moment M, largest", "kN m/m", 1e-3),
-    "bending_moment_min": ("bending moment M, smallest", "kN m/m", 1e-3),
-    "joint_opening_max": ("joint opening (+) or closing (−), largest", "mm", 1e3),
-    "joint_rotation_max": ("joint rotation, largest size", "mrad", 1e3),
-    "convergence_horizontal": ("horizontal diameter shorter (+) or longer (−)", "mm", 1e3),
-    "convergence_vertical": ("vertical diameter shorter (+) or longer (−)", "mm", 1e3),
 }
 SHEAR_LIMIT = 0.05  # of the largest Q; the slope of M is taken over one element
 THEORY_LIMIT = 0.02  # of the mean pressure; an element at the lining sees the depth of its middle
@@ -210,19 +198,6 @@ def ground_slips(scene):
     return scene.mpm.bond_friction(tunnel) > tunnel.friction_coefficient
 
 
-def ring_extremes(response, record):
-    """Extreme forces and joint deformations of one record: key of `RING_EXTREMES` to SI value."""
-    state, values = response.isel(time=record), {}
-    for key in RING_EXTREMES:
-        name, _, extreme = key.rpartition("_")
-        if key in state:
-            values[key] = float(state[key])
-        elif name in state and state[name].size:
-            found = np.abs(state[name].values) if name == "joint_rotation" else state[name].values
-            values[key] = float(np.nanmax(found) if extreme == "max" else np.nanmin(found))
-    return values
-
-
 def _ring_numbers(run, tunnel):
     models = model_names(run, tunnel)
     if not models:
@@ -231,18 +206,19 @@ def _ring_numbers(run, tunnel):
     first = responses[models[0]]
     if not first.sizes["time"]:
         return []
-    start, end = ring_extremes(first, 0), ring_extremes(first, -1)
+    found = ring_extremes(first)
+    start, end = ({key: float(values[row]) for key, values in found.items()} for row in (0, -1))
     others = []
     for name in models[1:]:
         rows, present = match_times(responses[name]["time"].values, first["time"].values[-1:])
         if present[0]:
-            others.append(ring_extremes(responses[name], int(rows[0])))
+            others.append({key: float(v[rows[0]]) for key, v in ring_extremes(responses[name]).items()})
     labels = ", ".join(models[1:]) if others else "another lining model: there is none"
     basis = f"{DIFFERENCE} {labels}"
     return [
-        Number(key if tunnel is None else f"tunnel_{tunnel}_{key}", label, unit, scale, start[key], end[key],
+        Number(key if tunnel is None else f"tunnel_{tunnel}_{key}", *shown_extreme(key), start[key], end[key],
                max((abs(other[key] - end[key]) for other in others if key in other), default=None), basis)
-        for key, (label, unit, scale) in RING_EXTREMES.items() if key in end
+        for key in RING_EXTREMES if key in end
     ]  # fmt: skip
 
 

@@ -11,7 +11,9 @@ from coupling.files.folder import REPORT_FILE, RUN_FILE
 from coupling.files.replace import replace_file
 from coupling.refused import Refused
 from coupling.report.frame import document
+from structure.response import SHOWN
 
+QUANTITIES = {name: (shown.unit, shown.scale) for name, shown in SHOWN.items()}
 MARK = '<meta name="generator" content="gushing report">'
 
 
@@ -53,7 +55,13 @@ def write_report(path: str | Path, out: str | Path | None = None, model: str | N
 
         target = _checked_path(folder, out)
         data, parts, scripts = study_page.collect(folder, target.parent, model), study_markup.parts, study_page.SCRIPTS
-    text = document(*parts(data), data["player"], _file("page.css"), "\n".join(map(_file, scripts)), MARK)
+    text = document(
+        *parts(data),
+        data["player"] | {"quantities": QUANTITIES},
+        _file("page.css"),
+        "\n".join(map(_file, scripts)),
+        MARK,
+    )
     replace_file(target, text)
     return target
 

@@ -8,9 +8,9 @@ from coupling.datasets import RunFileError
 from coupling.datasets.geometry import tunnels_beside
 from coupling.datasets.tree import match_times, model_names
 from coupling.report.packing import BASE64, evenly, packed
+from structure.response import FORCES, PRESSURES
 
-PRESSURES = ("soil_pressure", "water_pressure", "soil_shear")
-RING_FIELDS = ("axial_force", "shear_force", "bending_moment", "displacement_radial", "displacement_tangential")
+RING_FIELDS = (*FORCES, "displacement_radial", "displacement_tangential")
 JOINT_FIELDS = (
     "joint_axial_force", "joint_shear_force", "joint_bending_moment",
     "joint_opening", "joint_dislocation", "joint_rotation",

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from coupling.postprocess.extremes import RING_EXTREMES, shown_extreme
 from coupling.postprocess.quality import ERRORS, poor_errors
 from coupling.report.numbers import (
     DIFFERENCE,
-    RING_EXTREMES,
     THEORY_LIMIT,
     Number,
     ground_slips,
@@ -51,14 +51,14 @@ def case_numbers(dataset, models):
         for name, label, unit in INFLOW_NUMBERS
         if name in dataset.variables
     ]
-    for key, (label, unit, scale) in RING_EXTREMES.items() if models else ():
+    for key in RING_EXTREMES if models else ():
         values = [model[key] for model in models if key in model]
         if not values:
             continue
         others = [abs(other[end] - values[0][end]) for other in values[1:]]
         error = _finite(max(others)) if others else None
         numbers.append(
-            Number(key, label, unit, scale, _finite(values[0][0]), _finite(values[0][end]), error, DIFFERENCE)
+            Number(key, *shown_extreme(key), _finite(values[0][0]), _finite(values[0][end]), error, DIFFERENCE)
         )
     return numbers
 

@@ -8,22 +8,11 @@ import numpy as np
 from coupling.datasets.geometry import gate_of
 from coupling.files.provenance import origin, with_history
 from coupling.refused import Refused
+from structure.response import RESPONSE, SHOWN
 
 TITLE = "differences between lining models"
-#: Name: (label, unit shown, factor to it from SI).
-QUANTITIES = {
-    "axial_force": ("N", "kN/m", 1e-3),
-    "shear_force": ("Q", "kN/m", 1e-3),
-    "bending_moment": ("M", "kN m/m", 1e-3),
-    "displacement_radial": ("radial displacement", "mm", 1e3),
-    "displacement_tangential": ("tangential displacement", "mm", 1e3),
-    "joint_axial_force": ("joint N", "kN/m", 1e-3),
-    "joint_shear_force": ("joint Q", "kN/m", 1e-3),
-    "joint_bending_moment": ("joint M", "kN m/m", 1e-3),
-    "joint_opening": ("joint opening", "mm", 1e3),
-    "joint_dislocation": ("joint dislocation", "mm", 1e3),
-    "joint_rotation": ("joint rotation", "mrad", 1e3),
-}
+#: Forces, displacements and joints.
+QUANTITIES = tuple(name for name, (dimensions, _, _) in RESPONSE.items() if dimensions != ("time",))
 #: What differs by the offset of the curved section, and the axial force that brings it.
 OFFSETS = {
     "bending_moment": "axial_force",
@@ -116,7 +105,7 @@ def _differences(first, second, ring):
 
     missing = sorted(set(QUANTITIES) - set(first.data_vars) | set(QUANTITIES) - set(second.data_vars))
     if missing:
-        raise Refused(f"compare: both models must give {', '.join(missing)}; see structure.lining.RESPONSE")
+        raise Refused(f"compare: both models must give {', '.join(missing)}; see structure.response.RESPONSE")
     fields = {}
     for name in QUANTITIES:
         meaning = first[name].attrs
@@ -155,16 +144,16 @@ def _differences(first, second, ring):
 
 def _row(name, difference, first, cause, suffix=""):
     """The largest difference of one quantity, where and when."""
-    label, unit, scale = QUANTITIES[name]
+    shown = SHOWN[name]
     values = difference.values
     time, place = np.unravel_index(np.nanargmax(np.abs(values)), values.shape)
     extreme = float(np.nanmax(np.abs(first[name].values)))
     along_joints = difference.dims[1] == "joint"
     return {
         "name": name,
-        "label": label + suffix,
-        "unit": unit,
-        "scale": scale,
+        "label": shown.short + suffix,
+        "unit": shown.unit,
+        "scale": shown.scale,
         "difference": float(values[time, place]),
         "relative": abs(float(values[time, place])) / extreme if extreme else float(values[time, place] != 0),
         "theta": None if along_joints else float(first["theta"][place]),
