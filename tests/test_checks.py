@@ -11,8 +11,8 @@ from test_sections import UNEQUAL, section
 
 from coupling.figures import utilisations as check_figures
 from structure import BeamSpringLining, CapacityRule, InputError, Limits, additional, check
+from structure.capacity import interaction, radial_utilisation
 from structure.checks import UTILISATIONS
-from structure.sections import interaction, radial_utilisation
 
 RULE = dict(axial_force_factor=1.0, moment_factor=1.35, minimum_eccentricity=0.02, utilisation="radial")
 

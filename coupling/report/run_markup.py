@@ -2,7 +2,8 @@
 
 from html import escape
 
-from coupling.report.frame import duration, figure, header, provenance, rows_of_facts, shown
+from coupling.report.frame import figure, header, provenance, rows_of_facts, shown
+from coupling.runs.progress_line import duration
 from structure.response import FORCES, PRESSURES, SHOWN
 
 VERDICTS = {True: "as expected", False: "look at this", None: "–", "poor": "poor: look at this"}

@@ -3,8 +3,9 @@
 from html import escape
 
 from coupling.postprocess.quality import ERRORS
-from coupling.report.frame import duration, figure, header, provenance, rows_of_facts, scroll, shown
+from coupling.report.frame import figure, header, provenance, rows_of_facts, scroll, shown
 from coupling.report.run_markup import RING_CHARTS
+from coupling.runs.progress_line import duration
 from coupling.studies.design import short_names, value_text
 
 #: Of the run's key numbers those that stand in the table of cases, with their short headings.

@@ -11,12 +11,9 @@ if TYPE_CHECKING:
     from mpm.scene import Scene as MpmScene
 
 
-BYTES_PER_ELEMENT = 2000  # points, buffers and the copy made while sorting, of a case with 3 points an element
-
-
 def check_memory(mpm_scene: MpmScene) -> None:
     """Refuse a scene whose mesh and points would not fit into the memory that is free."""
-    free, need = free_memory_bytes(), mpm_scene.estimated_elements * BYTES_PER_ELEMENT
+    free, need = free_memory_bytes(), mpm_scene.estimated_bytes
     if free is not None and need > 0.8 * free:
         raise Refused(
             f"discretisation: about {mpm_scene.estimated_elements:.2g} elements need about {need / 1e9:.1f} GB, "

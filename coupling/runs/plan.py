@@ -52,10 +52,7 @@ def plan(
     """
     import mpm
 
-    scene = as_scene(scene)
-    for warning in warnings_of(scene):
-        (warn if warn is not None else warn_in_python)(warning)
-    check_memory(scene.mpm)
+    scene = _checked(scene, warn)
     mesh = mpm.build_mesh(scene.mpm)
     solver = mpm.Solver(scene.mpm, mesh, threads)
     dt, limit = solver.time_step_estimate()
@@ -87,6 +84,15 @@ def plan(
         "point_steps_per_second": rate,
         "expected_seconds": point_steps / rate,
     }
+
+
+def _checked(scene, warn):
+    """A valid scene that fits into the memory, what is unusual in it told."""
+    scene = as_scene(scene)
+    for warning in warnings_of(scene):
+        (warn if warn is not None else warn_in_python)(warning)
+    check_memory(scene.mpm)
+    return scene
 
 
 def _intervals(interval, time):
@@ -133,13 +139,7 @@ def rough_plan(
 ) -> dict[str, Any]:
     """What a run would do and cost, from formulas alone: no mesh, no points, some milliseconds.
 
-    Parameters
-    ----------
-    scene : coupling.Scene, str or path
-        As of :func:`coupling.run`.
-    threads : int or None
-    warn : callable or None
-        As of :func:`coupling.run`.
+    Parameters are those of :func:`plan`.
 
     Returns
     -------
@@ -156,10 +156,7 @@ def rough_plan(
     from mpm.solver import threads_used
     from mpm.threads import check_threads
 
-    scene = as_scene(scene)
-    for warning in warnings_of(scene):
-        (warn if warn is not None else warn_in_python)(warning)
-    check_memory(scene.mpm)
+    scene = _checked(scene, warn)
     check_threads(threads)
     s = scene.mpm
     elements, time = s.estimated_elements, expected_time(s)
