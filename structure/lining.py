@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
 from structure.pressures import PRESSURES, check_pressures
 from structure.response import COORDINATES, NOT_ADDITIONAL, RESPONSE
+from structure.springs import limit_pressures
+
+if TYPE_CHECKING:
+    from structure.ring import Ring
 
 __all__ = ["PRESSURES", "RESPONSE", "check_pressures"]  # of other modules, for models
 
@@ -60,22 +65,38 @@ class LiningModel(ABC):
         """
 
 
-def response_dataset(
-    fields: dict[str, np.ndarray], coordinates: dict[str, tuple[str, np.ndarray]], attributes: dict[str, str]
-) -> xr.Dataset:
-    """Response with the schema's dimensions, units and names.
+def ring_attributes(ring: Ring, model: str) -> dict[str, str]:
+    """Where the answer of a lining model comes from: the model, the ring and what its ground bears."""
+    attributes = {"Conventions": "CF-1.11", "model": model, "ring": ring.model_dump_json()}
+    if ring.ground is not None:
+        normal, tangential = limit_pressures(ring.ground)
+        attributes["limit_pressures"] = f"normal {normal:.6g} Pa, tangential {tangential:.6g} Pa"
+    return attributes
 
-    fields : name of :data:`RESPONSE` to array;  coordinates : name to (dimension, array).
+
+def response_dataset(
+    ring: Ring, pressures: xr.Dataset, fields: dict[str, np.ndarray], attributes: dict[str, Any]
+) -> xr.Dataset:
+    """Response to pressures with the schema's dimensions, units and names.
+
+    fields : name of :data:`structure.response.RESPONSE` to array;  attributes : from :func:`ring_attributes`, and more.
     """
-    variables = {}
-    for name, values in fields.items():
-        dimensions, units, long_name = RESPONSE[name]
-        variables[name] = (dimensions, values, {"units": units, "long_name": long_name})
-    axes = {}
-    for name, (dimension, values) in coordinates.items():
-        units, long_name = COORDINATES[name]
-        axes[name] = (dimension, values, {"units": units, "long_name": long_name})
-    return xr.Dataset(variables, coords=axes, attrs=attributes)
+    variables = {name: (RESPONSE[name][0], values) for name, values in fields.items()}
+    joints = np.array(ring.joint_angles, dtype=float)
+    axes = {
+        "time": ("time", pressures["time"].values, pressures["time"].attrs),
+        "theta": ("theta", THETA),
+        "joint": ("joint", np.arange(1, len(joints) + 1)),
+        "joint_angle": ("joint", joints),
+    }
+    title = f"response of the lining: {attributes['model']} model"
+    response = xr.Dataset(variables, coords=axes, attrs={"title": title, **attributes})
+    for name, variable in response.variables.items():
+        units, long_name = RESPONSE[name][1:] if name in RESPONSE else COORDINATES[name]
+        variable.attrs = {"units": units, "long_name": long_name} | variable.attrs
+    if "inflow_mass" in pressures:
+        response = response.assign_coords(inflow_mass=pressures["inflow_mass"])
+    return response
 
 
 def at_whole_degrees(dataset: xr.Dataset, along: str = "theta") -> xr.Dataset:

@@ -77,7 +77,8 @@ def _dump(dataset, file, group):
 
     # CF knows no missing coordinates, and a missing value is NaN here without being told
     encoding = {
-        name: {"fletcher32": variable.ndim > 0, "_FillValue": None} for name, variable in dataset.variables.items()
+        name: {"fletcher32": variable.ndim > 0 and variable.dtype.kind not in "OSU", "_FillValue": None}
+        for name, variable in dataset.variables.items()
     }
     if "time" in dataset.coords:
         dataset = dataset.assign_coords(time=dataset["time"].copy())

@@ -6,7 +6,6 @@ import re
 
 from mpm.variables import CLAMPS, POINT_VARIABLES
 
-STATUSES = ("running", "finished", "failed", "interrupted")
 AXES = {"time": "T", "x": "X", "y": "Y"}
 INFLOW = "inflow_mass"  # a coordinate along time, beside the time itself
 DT_LIMITS = ("acoustic", "advective", "output", "other")

@@ -55,22 +55,17 @@ def mesh_grids(snapshots: Iterable[xr.Dataset], mesh: xr.Dataset) -> Iterator[me
     """
     import meshio
 
-    from coupling.postprocess import element_of_points
+    from coupling.postprocess.elements import cell_means, element_areas, element_of_points
 
     nodes, corners = _vector(mesh["x"].values, mesh["y"].values), mesh["element_nodes"].values
-    p = nodes[corners]
-    area = 0.5 * np.abs(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])[:, 2])
+    area = element_areas(mesh)
     region, cells = mesh["region"].values, [("triangle", corners)]
     for snapshot in snapshots:
-        element = element_of_points(snapshot, mesh)
-        inside = element >= 0
-        weight = snapshot["volume"].values[inside].astype(float)
-        volume = np.bincount(element[inside], weight, len(corners))
-        share = weight / volume[element[inside]]
+        element, weight = element_of_points(snapshot, mesh), snapshot["volume"].values
+        volume = np.bincount(element[element >= 0], weight[element >= 0], len(corners))
 
-        def mean(name, snapshot=snapshot, element=element[inside], inside=inside, share=share, empty=volume == 0):
-            sums = np.bincount(element, share * snapshot[name].values[inside], len(corners))
-            return np.where(empty, np.nan, sums).astype("f4")
+        def mean(name, snapshot=snapshot, element=element, weight=weight):
+            return cell_means(element, weight, snapshot[name].values, len(corners)).astype("f4")
 
         data = {name: mean(name) for name in ELEMENT_MEANS if name in snapshot}
         if "displacement_x" in snapshot:

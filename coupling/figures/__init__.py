@@ -12,22 +12,7 @@ from coupling.figures.ring import deformed_ring, internal_forces, pressures_pola
 from coupling.figures.utilisations import checks
 
 __all__ = [
-    "GATE",
-    "INITIAL",
-    "NOW",
-    "Picture",
-    "RESOLUTION",
-    "SECOND",
-    "STYLE",
-    "checks",
-    "common_tops",
-    "deformed_ring",
-    "draw_run",
-    "fields_around_tunnel",
-    "forces_compared",
-    "inflow",
-    "internal_forces",
-    "joints_compared",
-    "mesh_near_gate",
-    "pressures_polar",
-]
+    "GATE", "INITIAL", "NOW", "Picture", "RESOLUTION", "SECOND", "STYLE", "checks", "common_tops", "deformed_ring",
+    "draw_run", "fields_around_tunnel", "forces_compared", "inflow", "internal_forces", "joints_compared",
+    "mesh_near_gate", "pressures_polar",
+]  # fmt: skip

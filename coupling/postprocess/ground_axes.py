@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from coupling.datasets.geometry import gate_diameter, gate_of, gate_position, tunnel_list
+from coupling.postprocess.elements import cell_means
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -74,13 +75,9 @@ def profile(points: xr.Dataset, direction: str, spacing: float = 0.5, half_width
             ground &= tunnel.distance(x, y) > tunnel.outer
         along, across = (x - gate[0], y - gate[1]) if direction == "horizontal" else (y - gate[1], x - gate[0])
         ground &= np.abs(across) <= half_width
-        cell = np.digitize(along[ground], edges) - 1
-        inside = (cell >= 0) & (cell < len(edges) - 1)
-        cell, weight = cell[inside], volume[ground][inside]
-        total = np.bincount(cell, weight, len(edges) - 1)
+        cell = np.where(ground, np.digitize(along, edges) - 1, -1)
         for name, values in point_quantities(now).items():
-            summed = np.bincount(cell, weight * values[ground][inside], len(edges) - 1)
-            rows[name].append(np.where(total > 0, summed / np.where(total > 0, total, 1.0), np.nan))
+            rows[name].append(cell_means(cell, volume, values, len(edges) - 1))
     return xr.Dataset(
         {
             name: (("time", "distance"), np.array(rows[name]), {"units": units, "long_name": text})

@@ -1,4 +1,4 @@
-"""What was computed: the scene in numbers, its section through the ground, and what was left out."""
+"""The scene of a run, read again from its text: its section through the ground, and what was left out."""
 
 from coupling.datasets.geometry import gate_of, has_tunnels, tunnel_list
 from coupling.refused import SceneError
