@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from coupling.commands.exit_codes import FAILED, JsonPath, checked_json, failures, write_json
+from structure.response import SHOWN
 
 
 def study_command(
@@ -41,7 +42,8 @@ def study_command(
 def _study_table(data):
     table = Table(title=f"{data['study']}{', ' + data['model'] if data['model'] else ''}")
     table.add_column("case", min_width=min(22, max(len(case["name"]) for case in data["cases"])))
-    for head in ("kg/m", "after s", "N max kN/m", "M kN m/m", "CPU s"):
+    axial, bending = SHOWN["axial_force"], SHOWN["bending_moment"]
+    for head in ("kg/m", "after s", f"N max {axial.unit}", f"M {bending.unit}", "CPU s"):
         table.add_column(head, no_wrap=True)
     table.add_column("status")
     for case in data["cases"]:
@@ -49,8 +51,9 @@ def _study_table(data):
         if case["status"] == "finished":
             force, moment = case["axial_force"], case["bending_moment"]
             cells = [f"{case['inflow_mass']:.4g}", f"{case['time']:.3g}"]
-            cells += [f"{force['max'] / 1e3:.0f}" if force else "-"]
-            cells += [f"{moment['min'] / 1e3:.0f} to {moment['max'] / 1e3:.0f}" if moment else "-"]
+            cells += [f"{axial.scale * force['max']:.0f}" if force else "-"]
+            ends = (f"{bending.scale * moment[end]:.0f}" for end in ("min", "max")) if moment else ()
+            cells += [" to ".join(ends) or "-"]
             cells += [f"{case['cpu_seconds']:.1f}"]
         table.add_row(case["name"], *cells, case["message"] or case["status"])
     return table

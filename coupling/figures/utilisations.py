@@ -8,6 +8,7 @@ from matplotlib.colors import Normalize
 
 from coupling.figures.picture import GATE, INITIAL, NOW, SECOND, STYLE, Picture
 from structure.checks import UTILISATIONS
+from structure.response import SHOWN
 
 COLOURS = {
     "section_utilisation": NOW,
@@ -39,7 +40,8 @@ def checks(checked):
 
 
 def _diagram(figure, axis, checked):
-    boundary = [checked[f"capacity_{name}"].values / 1e3 for name in ("bending_moment", "axial_force")]
+    shown = {name: SHOWN[name] for name in ("bending_moment", "axial_force")}
+    boundary = [one.scale * checked[f"capacity_{name}"].values for name, one in shown.items()]
     axis.fill(*boundary, color="0.94", lw=0)
     axis.plot(*boundary, color="0.2", lw=1.2)
     time = checked["time"].values
@@ -48,8 +50,7 @@ def _diagram(figure, axis, checked):
     for record in chosen[::-1]:  # earlier states, usually the closer ones, on top
         state = checked.isel(time=int(record))
         axis.scatter(
-            state["design_bending_moment"].values / 1e3,
-            state["design_axial_force"].values / 1e3,
+            *(one.scale * state[f"design_{name}"].values for name, one in shown.items()),
             s=7,
             color=colours(norm(time[record])),
             lw=0,
@@ -57,7 +58,7 @@ def _diagram(figure, axis, checked):
         )
     worst = checked["section_utilisation"].isel(checked["section_utilisation"].argmax(("time", "theta")))
     state = checked.sel(time=worst["time"], theta=worst["theta"])
-    place = [state[f"design_{name}"].item() / 1e3 for name in ("bending_moment", "axial_force")]
+    place = [one.scale * state[f"design_{name}"].item() for name, one in shown.items()]
     axis.plot(*place, "o", ms=7, mfc="none", mec=GATE, mew=1.2, zorder=4)
     axis.set_title(
         f"largest utilisation {worst.item():.2f} at {worst['theta'].item():.4g}°, {worst['time'].item():.3g} s\n"
@@ -68,12 +69,14 @@ def _diagram(figure, axis, checked):
         bar.set_label("time since the gate opened [s]")
         bar.outline.set_linewidth(0.5)
     # thin rings use the lower corner of their diagram: the view ends at three times their axial force
-    top = min(boundary[1].max(), 3.0 * max(checked["design_axial_force"].max().item() / 1e3, 0.0))
+    top = min(
+        boundary[1].max(), 3.0 * max(shown["axial_force"].scale * checked["design_axial_force"].max().item(), 0.0)
+    )
     axis.set_ylim(1.1 * min(boundary[1].min(), place[1]), max(1.1 * top, 0.1 * boundary[1].max()))
     axis.axhline(0, color="0.6", lw=0.5)
     axis.axvline(0, color="0.6", lw=0.5)
-    axis.set_xlabel("design bending moment [kN m/m]")
-    axis.set_ylabel("design axial force [kN/m], compression positive")
+    axis.set_xlabel(f"design {shown['bending_moment'].label}")
+    axis.set_ylabel(f"design {shown['axial_force'].label}, compression positive")
 
 
 def _over_time(axis, checked):
