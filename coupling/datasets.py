@@ -447,12 +447,14 @@ def write_dataset(path: str | Path, dataset: xr.Dataset, group: str | None = Non
     mode, options = "w" if group is None else "a", {"driver_kwds": {"libver": CHECKED_FORMAT}}
     # CF knows no missing coordinates, and a missing value is NaN here without being told
     encoding = {
-        name: {"fletcher32": variable.ndim > 0, "_FillValue": None} for name, variable in dataset.variables.items()
+        name: {"fletcher32": variable.ndim > 0 and variable.dtype.kind not in "OSU", "_FillValue": None}
+        for name, variable in dataset.variables.items()
     }
     if "time" in dataset.coords:
         dataset = dataset.assign_coords(time=dataset["time"].copy())
         dataset["time"].attrs.pop("axis", None)
-    with H5NetCDFStore.open(path, mode=mode, group=group, **options) as store:
+    # h5py has a lock of its own; looking for one of dask's loads all of its scheduler
+    with H5NetCDFStore.open(path, mode=mode, group=group, lock=False, **options) as store:
         dataset.dump_to_store(store, encoding=encoding)
     if group is not None:
         with h5netcdf.File(path, "r+", libver=CHECKED_FORMAT) as file:

@@ -207,6 +207,24 @@ def test_script_without_a_guard_runs_its_study_in_processes_and_in_silence(tmp_p
     assert done.stdout == "['finished', 'finished', 'finished'] ['angle 60', 'angle 90', 'angle 120']\n"
 
 
+def test_workers_load_what_a_case_needs_once_and_no_scheduler(tmp_path):
+    # six short cases take longer by two workers than in a loop where each worker loads libraries for itself
+    code = (
+        "import sys\nfrom importlib import import_module\nfrom coupling.studies.worker import LOADED\n"
+        "for name in LOADED:\n    import_module(name)\n"
+        "def heavy(): return {name.split('.')[0] for name in sys.modules} | {n for n in sys.modules if 'scipy.' in n}\n"
+        "before = heavy()\nfrom coupling.studies.case import run_case\n"
+        "run_case(sys.stdin.read(), sys.argv[1], ('beam-spring',), 2)\n"
+        "print(*{n for n in heavy() - before if n.count('.') < 2 and n.split('.')[-1][0] != '_'})\n"
+        "print('distributed' in sys.modules)"
+    )
+    scene = small_scene(stop={"inflow_mass": 1.0, "time": 0.01}).source
+    done = subprocess.run([sys.executable, "-W", "ignore", "-c", code, tmp_path], input=scene, capture_output=True,
+                          text=True, check=True)  # fmt: skip
+    loaded, scheduler = done.stdout.splitlines()
+    assert set(loaded.split()) <= {"threadpoolctl"} and scheduler == "False"
+
+
 def test_interrupted_study_leaves_no_process_behind(tmp_path):
     class Stopped(Exception):
         pass

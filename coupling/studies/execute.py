@@ -6,6 +6,7 @@ import json
 import os
 import time as clock
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 LOSSES = 3
 #: Workers that were lost are started again within seconds [s].
 LONGEST_WITHOUT_WORKERS = 60.0
+#: What collecting and storing the cases loads; loaded while the workers load what they need.
+COLLECTING = ("xarray", "structure.lining", "pint", "h5netcdf", "dask.array", "dask.distributed")
 CASES, STATUS_FILE, DATA_FILE, STUDY_FILE = "cases", "status.json", "study.nc", "study.json"
 
 
@@ -131,8 +134,8 @@ def _in_processes(plan, missing, folder, count, threads):
     found = {case.key: case for case in missing}
     losses: dict[str, int] = {}
     with Pool(count) as pool:
-        import xarray  # noqa: F401, needed in the end, loaded while the workers load what they need
-
+        for module in COLLECTING:
+            import_module(module)
         for key, ended in pool.run(run_case, calls):
             if isinstance(ended, WorkerLost):
                 losses[key] = 1

@@ -164,7 +164,7 @@ def _lost_worker(part):
         "## A lost worker",
         "",
         f"`uv run python -m verification.robustness.lost_worker {part['runs']}`. "
-        "A study of {part['runs']} coarse runs on a dask "
+        f"A study of {part['runs']} coarse runs on a dask "
         f"scheduler with two worker processes, of which {part['workers_killed']} was killed in the middle, against the "
         "same study in one process.",
         "",
