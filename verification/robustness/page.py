@@ -100,8 +100,8 @@ def _pressures(part):
         "netCDF files of "
         "random pressures in random units, orders and precisions, each with one mistake or none. The generator knows "
         "what was meant: a file must give that, be warned of, or be refused with rule, value and remedy. "
-        "Untold: eight or nine uneven angles in gon that are called degrees, all within one turn, are as good a file in "
-        "degrees; nobody can know better.",
+        "Untold: eight or nine uneven angles in gon that are called degrees, all within one turn, are as good a file "
+        "in degrees; nobody can know better.",
         "",
         "| mistake | " + " | ".join(kinds) + " |",
         "|---|" + "---|" * len(kinds),
