@@ -43,11 +43,11 @@ def plan(
     dict
         scene; features: list of {feature, active, reason}; initial_k0: see :func:`initial_k0`; elements, nodes, points;
         min_altitude [m]; min_angle [degree]; dt [s]; dt_limit; stop_time [s] or None; stop_inflow_mass [kg/m] or None;
-        steps_to_stop_time (None without a stop time); expected_time [s] and expected_steps: rough where the run stops at an
-        inflow mass; steps are those of the smallest elements, cut to the output interval; expected_point_steps: updates
-        of one point by one step; records; memory_bytes, free_memory_bytes; point_steps_per_second: measured now;
-        expected_seconds: of stepping, without mesh, relaxation and pictures. Steps are counted with the step of the
-        initial state; where ground flows it becomes up to a third shorter.
+        steps_to_stop_time (None without a stop time); expected_time [s] and expected_steps: rough where an inflow mass
+        stops the run; steps are those of the smallest elements, cut to the output interval; expected_point_steps:
+        updates of one point by one step; records; memory_bytes, free_memory_bytes; point_steps_per_second: measured
+        now; expected_seconds: of stepping, without mesh, relaxation and pictures. Steps are counted with the step of
+        the initial state; where ground flows it becomes up to a third shorter.
     """
     import mpm
 

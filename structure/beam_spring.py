@@ -17,7 +17,7 @@ from structure.beam_geometry import (
 )
 from structure.equilibrium import NoEquilibrium, RingEquilibrium
 from structure.lining import SIDES, THETA, LiningFailure, LiningModel, check_pressures, response_dataset
-from structure.ring import Ring
+from structure.ring import Ring, check_ring
 from structure.springs import joint_spring, limit_pressures
 
 
@@ -37,6 +37,7 @@ class BeamSpringLining(LiningModel):
     """
 
     def __init__(self, ring: Ring):
+        check_ring(ring)
         self.ring = ring
         self.mesh = RingMesh(ring)
         self._invert = int(np.argmin(np.abs((self.mesh.node_angle % (2 * np.pi)) - np.pi)))

@@ -17,7 +17,7 @@ from structure.continuum_sections import section_displacements, section_forces
 from structure.continuum_stiffness import Concrete, joint_operators, joint_stiffness, nodes_from_unknowns
 from structure.equilibrium import NoEquilibrium
 from structure.lining import SIDES, THETA, LiningFailure, LiningModel, check_pressures, response_dataset
-from structure.ring import Ring
+from structure.ring import Ring, check_ring
 from structure.springs import joint_spring, limit_pressures
 
 #: Name: (dimensions, units, long name) of the stress dataset.
@@ -81,6 +81,7 @@ class ContinuumLining(LiningModel):
         gate = None if gate is None else Gate(*gate)
         groove = None if groove is None else GasketGroove(*groove)
         bolts = None if bolts is None else Bolts(*bolts)
+        check_ring(ring)
         _refuse_unsupported(ring)
         _refuse_options(ring, columns, layers, joint, strip_width, gate)
         if groove is not None:

@@ -163,6 +163,39 @@ def test_impossible_study_is_refused_before_it_runs(change, message):
     assert message in str(refusal.value)
 
 
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"backends": "continuum"}, "backends: must be a list, got 'continuum'; correct it"),
+        ({"records": 2.5}, "records: must be a valid integer, got a number with a fractional part, got 2.5; correct"),
+        ({"parameters": {}}, "parameters: must have at least 1 entry"),
+        ({"parameters": {"gate": {"angle": [10.0]}}}, "gate: must be a list of values or a range; angle: unknown key"),
+        ({"design": "sobol", "samples": 4, "parameters": {"gate.width": {"low": "20 cm", "high": 0.15}}},
+         "gate.width: must be a list of values or a range; low must be below high, got 0.2 and 0.15; swap them"),
+        ({"desing": "list"}, "desing: unknown key, got 'list'; did you mean 'design'?"),
+    ],
+)  # fmt: skip
+def test_mistakes_of_a_study_are_told_in_words(change, message):
+    with pytest.raises(StudyError) as caught:
+        load_study(TINY | change)
+    assert message in str(caught.value) and "Input should" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"workers": -1}, "workers: must be a whole number from 0, got -1"),
+        ({"workers": "two"}, "workers: must be a whole number from 0, got 'two'"),
+        ({"out": 3}, "out: must be the path of a folder, got 3"),
+    ],
+)
+def test_study_refuses_arguments_of_a_wrong_type_before_it_starts(arguments, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(StudyError, match=message):
+        coupling.study(TINY, **arguments)
+    assert not list(tmp_path.iterdir())
+
+
 def test_failed_case_costs_only_itself_and_the_rest_is_not_run_again(fast, tmp_path, monkeypatch):
     lines = []
     data = coupling.study(TINY, tmp_path, workers=0, progress=lines.append)

@@ -28,6 +28,7 @@ from coupling.scene import (
     read_toml_file,
 )
 from coupling.scene_lines import line_of
+from structure.inputs import mistakes
 
 #: Changes when stored cases can no longer be used.
 FORMAT = "2"
@@ -112,8 +113,7 @@ class Study(BaseModel):
         for name, values in parameters.items():
             values = values.tolist() if hasattr(values, "tolist") else values
             if isinstance(values, dict):
-                values = {key: _in_unit(name, value) if key in ("low", "high") else value
-                          for key, value in values.items()}  # fmt: skip
+                values = _range(name, values)
             elif not isinstance(values, list | tuple | Range):
                 raise ValueError(f"{name}: must be a list of values or a range, got {values!r}; write [{values!r}], or "
                                  "give it under fixed")  # fmt: skip
@@ -218,15 +218,11 @@ def load_study(study: str | Path | dict | Study) -> Study:
         return Study.model_validate(data)
     except ValidationError as error:
         lines = []
-        for item in error.errors():
-            where = ".".join(str(part) for part in item["loc"] if part not in ("tuple[any, ...]", "Range"))
-            message = f"{where}: {item['msg'].removeprefix('Value error, ')}".removeprefix(": ")
-            if item["type"] == "extra_forbidden":
-                near = difflib.get_close_matches(where, Study.model_fields, 1)
-                message += f"; did you mean {near[0]!r}?" if near else f"; known: {', '.join(Study.model_fields)}"
+        for where, message in mistakes(error, Study):
+            message = ": ".join([*[".".join(map(str, where))] * bool(where), message])
             if ";" not in message:
                 message += "; correct it, `gush study table-2` is an example"
-            number = _line(text, item["loc"] or re.findall(r"\w+", message)[:1])
+            number = _line(text, where or re.findall(r"\w+", message)[:1])
             lines.append(f"line {number}: {message}" if number else message)
         raise StudyError("\n  ".join([f"{origin} has {len(lines)} mistake{'s' * (len(lines) > 1)}:", *lines])) from None
 
@@ -270,6 +266,15 @@ def cases(study: Study) -> list[Case]:
         # what a scene is already is no case more
         found.setdefault(key, Case(len(found), known, {name: known[name] for name in changes}, scene, key))
     return list(found.values())
+
+
+def _range(name, table):
+    ends = {key: _in_unit(name, value) if key in ("low", "high") else value for key, value in table.items()}
+    try:
+        return Range.model_validate(ends)
+    except ValidationError as error:
+        said = "; ".join(": ".join([*map(str, where), message]) for where, message in mistakes(error, Range))
+        raise ValueError(f"{name}: must be a list of values or a range; {said}") from None
 
 
 def _in_unit(name, value):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import numbers
 import os
 import time as clock
 from collections.abc import Callable
@@ -66,6 +67,7 @@ def study(
     """
     from coupling.studies.collect import collect
 
+    _check_arguments(out, workers)
     plan = load_study(what)
     check_backends(plan)
     todo = cases(plan)
@@ -93,6 +95,14 @@ def study(
     }  # fmt: skip
     _write_json(folder / STATUS_FILE, status)
     return collect(plan, todo, folder, failures)
+
+
+def _check_arguments(out, workers):
+    if out is not None and not isinstance(out, str | os.PathLike):
+        raise StudyError(f"out: must be the path of a folder, got {out!r}; leave it out for studies/NAME")
+    whole = isinstance(workers, numbers.Integral) and not isinstance(workers, bool)
+    if workers is not None and not (whole and workers >= 0):
+        raise StudyError(f"workers: must be a whole number from 0, got {workers!r}; leave it out for one a core")
 
 
 def case_file(folder: Path, case: Case) -> Path:
