@@ -2,8 +2,9 @@
 
 Samples and correlations are scipy's (`scipy.stats.qmc`, `spearmanr`). The effects are our own, since they are to come
 out of the cases that there are: `scipy.stats.sobol_indices`, and SALib's Sobol and Morris, ask for samples of their
-own, n (d + 2) and n (d + 1) cases of d parameters with n up to hundreds, and know neither texts nor listed values nor
-the base of a one-at-a-time study. Of a linear function the squares of the effects are in the ratio of its Sobol indices.
+own, n (d + 2) and n (d + 1) cases of d parameters with n up to hundreds, and know neither texts nor listed values
+nor the base of a one-at-a-time study. Of a linear function the squares of the effects are in the ratio of its Sobol
+indices.
 """
 
 from __future__ import annotations
