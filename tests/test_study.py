@@ -18,6 +18,7 @@ from coupling.datasets import read_response
 from coupling.studies import case as case_module
 from coupling.studies import execute
 from coupling.studies.case import at_inflow_masses
+from coupling.studies.collect import units_of
 from coupling.studies.design import Study, StudyError, cases, load_study, study_names
 from coupling.studies.pool import Pool
 from coupling.studies.progress import CaseProgress, study_state
@@ -502,6 +503,7 @@ def test_parameters_with_units_are_numbers_of_the_dataset(fast, tmp_path):
     plan = TINY | {"parameters": {"gate.angle": ["1 rad", "60 deg"], "soils.0.k0": [0.5, 0.55]}}
     data = coupling.study(plan, tmp_path, workers=0)
     np.testing.assert_allclose(data["gate_angle"], np.degrees([1, 1, np.pi / 3, np.pi / 3]))
+    assert (data["gate_angle"].attrs["units"], data["soils_0_k0"].attrs["units"]) == ("degree", "1")
     moment = data["bending_moment"].isel(progress=-1)
     assert set(sensitivity(data, moment)["parameter"].values) == {"gate_angle", "soils_0_k0"}
     ranges = {"gate.width": {"low": "15 cm", "high": "0.2 m"}, "ring.concrete_modulus": {"low": "20 GPa", "high": 3e10}}
@@ -509,6 +511,15 @@ def test_parameters_with_units_are_numbers_of_the_dataset(fast, tmp_path):
     values = np.array([list(c.parameters.values()) for c in cases(sampled)])
     assert 0.15 <= values[:, 0].min() and values[:, 0].max() <= 0.2
     assert 2e10 <= values[:, 1].min() and values[:, 1].max() <= 3e10
+
+
+@pytest.mark.parametrize(
+    ("name", "units"),
+    [("gate.width", "m"), ("soils.0.grain_density", "kg/m^3"), ("stop.inflow_mass", "kg/m"), ("soils.0.porosity", "1"),
+     ("ring.joint_rotational_stiffness", "N m/rad/m"), ("ring.ground.cohesion", "Pa"), ("scene", "1")],
+)  # fmt: skip
+def test_units_of_a_parameter_are_those_of_its_key(name, units):
+    assert units_of(name) == units
 
 
 def test_effect_beside_a_k0_that_varies_with_depth_is_that_of_the_own_parameter():

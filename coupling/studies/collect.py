@@ -11,6 +11,7 @@ import numpy as np
 
 from coupling.netcdf_group import read_group_at_once
 from coupling.provenance import origin, with_history
+from coupling.scene import unit_of
 from coupling.studies.design import Case, Study, StudyError
 
 if TYPE_CHECKING:
@@ -67,7 +68,8 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     result = result.assign_coords(case_name=("case", names, {"long_name": "what the case changes"}))
     for name in plan.parameters:
         values = _column([case.parameters[name] for case in cases])
-        result = result.assign_coords({name.replace(".", "_"): ("case", values, {"long_name": name})})
+        about = {"long_name": name} | ({"units": units_of(name)} if values.dtype.kind in "fiu" else {})
+        result = result.assign_coords({name.replace(".", "_"): ("case", values, about)})
     if "scene" in plan.parameters:
         result = result.assign_coords(_of_scenes(cases))
     done = np.array([case in there for case in cases])
@@ -82,6 +84,11 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
         "failed": int((~done).sum()),
     }
     return result
+
+
+def units_of(name: str) -> str:
+    """Units of a parameter as datasets spell them."""
+    return (unit_of(name) or "1").replace("**", "^").replace("*", " ")
 
 
 def _column(values):

@@ -215,7 +215,8 @@ def scatter(study, quantity, label: str = "", scale: float = 1.0):
         for axes, name in zip(panels, names, strict=True):
             values = parameters[name]
             axes.plot(values, scale * quantity.values, "o", ms=4, color="#0b5394")
-            axes.set_xlabel(name)
+            unit = study[name].attrs.get("units", "1")
+            axes.set_xlabel(name if unit == "1" else f"{name} [{unit}]")
             axes.grid(True)
             if values.dtype.kind == "f" and values.min() > 0 and values.max() / values.min() > 30:
                 axes.set_xscale("log")
