@@ -15,6 +15,7 @@ from test_cli import gush
 
 import coupling
 from coupling.datasets import read_response
+from coupling.info import describe
 from coupling.studies import case as case_module
 from coupling.studies import execute
 from coupling.studies.case import at_inflow_masses
@@ -332,6 +333,30 @@ def test_killed_case_is_continued_not_begun_anew(tmp_path, monkeypatch):
         for stamp in ("created", "history"):  # when each was made
             del one.attrs[stamp]
     xr.testing.assert_identical(*(one.drop_vars("cpu_seconds") for one in both))
+
+
+def test_study_that_was_stopped_says_so_and_goes_on_from_its_folder(fast, tmp_path, monkeypatch):
+    class Stopped(BaseException):
+        pass
+
+    def stopped(*arguments):
+        if len(list((tmp_path / "out" / "cases").glob("*/case.nc"))) == 2:
+            raise Stopped
+        return made_up(*arguments)
+
+    monkeypatch.setattr(execute, "run_case", stopped)
+    with pytest.raises(Stopped):
+        coupling.study(TINY, tmp_path / "out", workers=0)
+    found = describe(tmp_path / "out")
+    assert found["facts"]["finished"] == 2 and found["next"][0] == f"gush study {tmp_path / 'out'}"
+    monkeypatch.setattr(execute, "run_case", made_up)
+    shown = gush(*found["next"][0].split()[1:], "--workers", "0")
+    assert "4 cases, 2 of them are there already" in shown.output
+    whole = coupling.study(TINY, tmp_path / "whole", workers=0)
+    xr.testing.assert_identical(coupling.read_study(tmp_path / "out")["bending_moment"], whole["bending_moment"])
+    for empty in (tmp_path, tmp_path / "out" / "cases"):
+        with pytest.raises(StudyError, match=r"must hold study\.json, got none"):
+            load_study(empty)
 
 
 def test_command_runs_a_study_file(fast, tmp_path):

@@ -133,16 +133,11 @@ def stored_cases(folder: str | Path) -> tuple[Study, list[Case], dict[str, str]]
     coupling.studies.design.StudyError
         No study there, or its files are damaged.
     """
-    from coupling.studies.design import cases, load_study
-    from coupling.studies.execute import STATUS_FILE, STUDY_FILE
+    from coupling.studies.design import cases, stored_study
+    from coupling.studies.execute import STATUS_FILE
 
     folder = Path(folder)
-    try:
-        plan = load_study(json.loads((folder / STUDY_FILE).read_text(encoding="utf-8")))
-    except FileNotFoundError:
-        raise StudyError(f"study folder '{folder}': must hold {STUDY_FILE}, got none; run gush study first") from None
-    except ValueError as error:
-        raise StudyError(f"study folder '{folder}': {STUDY_FILE} must be that of a study, got: {error}") from None
+    plan = stored_study(folder)
     found = cases(plan)
     try:
         text = (folder / STATUS_FILE).read_text(encoding="utf-8") if (folder / STATUS_FILE).is_file() else "{}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import hashlib
 import itertools
+import json
 import math
 import re
 from dataclasses import dataclass
@@ -32,6 +33,7 @@ from structure.inputs import mistakes
 
 #: Changes when stored cases can no longer be used.
 FORMAT = "2"
+STUDY_FILE = "study.json"
 #: What stands for a whole table that a case leaves as the scene has it, and for a case that changes nothing.
 AS_IT_IS = "as it is"
 
@@ -202,7 +204,7 @@ def value_text(value: Any) -> str:
 
 
 def load_study(study: str | Path | dict | Study) -> Study:
-    """A study from a built-in name, a TOML file, a nested dictionary, or as it is.
+    """A study from a built-in name, a TOML file, the folder of one that ran, a nested dictionary, or as it is.
 
     Raises
     ------
@@ -211,6 +213,8 @@ def load_study(study: str | Path | dict | Study) -> Study:
     """
     if isinstance(study, Study):
         return study
+    if is_folder(study):
+        return stored_study(study)
     origin = "study" if isinstance(study, dict) else f"study '{study}'"
     text = "" if isinstance(study, dict) else _read(str(study))
     data = study if isinstance(study, dict) else parse_toml(text, origin)
@@ -232,6 +236,27 @@ def _line(text, location):
     location = tuple(location)
     found = (line_of(text, location[:k]) for k in range(len(location), 0, -1)) if text else ()
     return next((number for number in found if number is not None), None)
+
+
+def is_folder(study: object) -> bool:
+    """Whether a study is given by the folder of one that ran; names of built-in ones come first."""
+    return isinstance(study, str | Path) and Path(study).is_dir() and str(study) not in study_names()
+
+
+def stored_study(folder: str | Path) -> Study:
+    """The definition of a study that ran earlier, from its folder.
+
+    Raises
+    ------
+    StudyError
+        No study there, or its file is damaged.
+    """
+    try:
+        return load_study(json.loads((Path(folder) / STUDY_FILE).read_text(encoding="utf-8")))
+    except FileNotFoundError:
+        raise StudyError(f"study folder '{folder}': must hold {STUDY_FILE}, got none; run gush study first") from None
+    except ValueError as error:
+        raise StudyError(f"study folder '{folder}': {STUDY_FILE} must be that of a study, got: {error}") from None
 
 
 def study_names() -> list[str]:

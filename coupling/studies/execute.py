@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coupling.studies.case import CASE_FILE, run_case
-from coupling.studies.design import Case, Study, StudyError, cases, check_backends, load_study
+from coupling.studies.design import STUDY_FILE, Case, Study, StudyError, cases, check_backends, is_folder, load_study
 from coupling.studies.progress import StudyState, watching
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ LOSSES = 3
 LONGEST_WITHOUT_WORKERS = 60.0
 #: What collecting and storing the cases loads; loaded while the workers load what they need.
 COLLECTING = ("xarray", "structure.lining", "pint", "h5netcdf", "dask.array", "dask.distributed")
-CASES, STATUS_FILE, DATA_FILE, STUDY_FILE = "cases", "status.json", "study.nc", "study.json"
+CASES, STATUS_FILE, DATA_FILE = "cases", "status.json", "study.nc"
 
 
 def study(
@@ -43,9 +43,9 @@ def study(
     Parameters
     ----------
     what : str, path, dict or Study
-        Built-in study, TOML file, or the same as a dictionary.
+        Built-in study, TOML file, the folder of a study that is to go on, or the same as a dictionary.
     out : str or path, optional
-        Folder; studies/NAME when left out. Studies may share one: equal cases are then shared.
+        Folder; the one that is to go on, or studies/NAME, when left out. Studies may share one, and then equal cases.
     workers : int, optional
         Processes on this machine, which share its cores; number of cores when left out; 0 runs in this process.
     scheduler : str, optional
@@ -71,7 +71,7 @@ def study(
     plan = load_study(what)
     check_backends(plan)
     todo = cases(plan)
-    folder = Path(out) if out is not None else Path("studies") / plan.name
+    folder = study_folder(what, plan, out)
     tell = progress if progress is not None else lambda line: None
     try:
         (folder / CASES).mkdir(parents=True, exist_ok=True)
@@ -95,6 +95,13 @@ def study(
     }  # fmt: skip
     _write_json(folder / STATUS_FILE, status)
     return collect(plan, todo, folder, failures)
+
+
+def study_folder(what: str | Path | dict | Study, plan: Study, out: str | Path | None) -> Path:
+    """Where a study is written: `out`, the folder that it was read from, or studies/NAME."""
+    if out is not None:
+        return Path(out)
+    return Path(what) if is_folder(what) else Path("studies") / plan.name
 
 
 def _check_arguments(out, workers):
