@@ -336,17 +336,15 @@ def test_killed_case_is_continued_not_begun_anew(tmp_path, monkeypatch):
 
 
 def test_study_that_was_stopped_says_so_and_goes_on_from_its_folder(fast, tmp_path, monkeypatch):
-    class Stopped(BaseException):
-        pass
-
     def stopped(*arguments):
         if len(list((tmp_path / "out" / "cases").glob("*/case.nc"))) == 2:
-            raise Stopped
+            raise KeyboardInterrupt
         return made_up(*arguments)
 
     monkeypatch.setattr(execute, "run_case", stopped)
-    with pytest.raises(Stopped):
+    with pytest.raises(KeyboardInterrupt) as stop:
         coupling.study(TINY, tmp_path / "out", workers=0)
+    assert stop.value.__notes__ == [f"what is done is kept; go on with: gush study {tmp_path / 'out'}"]
     found = describe(tmp_path / "out")
     assert found["facts"]["finished"] == 2 and found["next"][0] == f"gush study {tmp_path / 'out'}"
     monkeypatch.setattr(execute, "run_case", made_up)

@@ -83,11 +83,15 @@ def study(
     failures: dict[str, str] = {}
     with watching(folder / CASES, {case.key: case.index for case in todo}, failures, watch):
         outcomes = _run(plan, list(missing.values()), folder, workers, scheduler)
-        for count, (case, failure) in enumerate(outcomes, start=1):
-            if failure:
-                failures[case.key] = failure
-            outcome = f"failed: {failure}" if failure else "done"
-            tell(f"{count} of {len(missing)}: {case.name}: {outcome}")
+        try:
+            for count, (case, failure) in enumerate(outcomes, start=1):
+                if failure:
+                    failures[case.key] = failure
+                outcome = f"failed: {failure}" if failure else "done"
+                tell(f"{count} of {len(missing)}: {case.name}: {outcome}")
+        except KeyboardInterrupt as stop:
+            stop.add_note(f"what is done is kept; go on with: gush study {folder}")
+            raise
     status = {
         case.key: {"parameters": case.parameters, "status": "failed" if case.key in failures else "finished",
                    "message": failures.get(case.key, "")}
