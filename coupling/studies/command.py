@@ -22,6 +22,7 @@ def run_study(name, out, workers, scheduler, console):
         parameters, status, message, cpu_seconds [s], and at the last inflow mass reached: inflow_mass [kg/m], time [s],
         axial_force [N/m] and bending_moment [N m/m] of that model as {max, min}, None without a ring.
     """
+    from coupling.datasets import write_dataset
     from coupling.studies.design import cases, load_study
     from coupling.studies.execute import DATA_FILE, study, study_folder
     from coupling.studies.progress import StudyLine
@@ -31,7 +32,10 @@ def run_study(name, out, workers, scheduler, console):
     with StudyLine(console) as line:
         dataset = study(plan, folder, workers, scheduler, partial(console.print, highlight=False, soft_wrap=True), line)
     waiting = folder / f"{DATA_FILE}.new"
-    dataset.to_netcdf(waiting, engine="h5netcdf")
+    if dataset.chunks:  # of a large study, loaded piece by piece
+        dataset.to_netcdf(waiting, engine="h5netcdf")
+    else:
+        write_dataset(waiting, dataset)
     waiting.replace(folder / DATA_FILE)
     rows = []
     for case in cases(plan):

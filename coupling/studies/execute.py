@@ -23,7 +23,7 @@ LOSSES = 3
 #: Workers that were lost are started again within seconds [s].
 LONGEST_WITHOUT_WORKERS = 60.0
 #: What collecting and storing the cases loads; loaded while the workers load what they need.
-COLLECTING = ("xarray", "structure.lining", "pint", "h5netcdf", "dask.array", "dask.distributed")
+COLLECTING = ("xarray", "structure.lining", "pint", "h5netcdf", "dask.array")
 CASES, STATUS_FILE, DATA_FILE = "cases", "status.json", "study.nc"
 
 
