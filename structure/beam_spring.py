@@ -25,7 +25,7 @@ from structure.lining import (
     response_dataset,
     ring_attributes,
 )
-from structure.ring import Ring
+from structure.ring import Ring, check_ring
 from structure.springs import joint_spring
 
 
@@ -45,6 +45,7 @@ class BeamSpringLining(LiningModel):
     """
 
     def __init__(self, ring: Ring):
+        check_ring(ring)
         self.ring = ring
         self.mesh = RingMesh(ring)
         self._invert = int(np.argmin(np.abs((self.mesh.node_angle % (2 * np.pi)) - np.pi)))

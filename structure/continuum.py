@@ -25,7 +25,7 @@ from structure.lining import (
     response_dataset,
     ring_attributes,
 )
-from structure.ring import Ring
+from structure.ring import Ring, check_ring
 from structure.springs import joint_spring
 
 #: Name: (dimensions, units, long name) of the stress dataset.
@@ -89,6 +89,7 @@ class ContinuumLining(LiningModel):
         gate = None if gate is None else Gate(*gate)
         groove = None if groove is None else GasketGroove(*groove)
         bolts = None if bolts is None else Bolts(*bolts)
+        check_ring(ring)
         _refuse_unsupported(ring)
         _refuse_options(ring, columns, layers, joint, strip_width, gate)
         if groove is not None:

@@ -67,6 +67,11 @@ def check_pressures(pressures: xr.Dataset, ring: Ring | None = None) -> xr.Datas
 
 
 def _require_variables(pressures):
+    if not hasattr(pressures, "data_vars"):
+        raise ValueError(
+            f"pressures: must be an xarray.Dataset of {', '.join(PRESSURES)}, got a {type(pressures).__name__}; "
+            "structure.theoretical_pressures makes one"
+        )
     missing = [name for name in PRESSURES if name not in pressures]
     if missing:
         raise ValueError(

@@ -280,7 +280,7 @@ def test_plan_says_what_is_left_out_and_why(tmp_path):
     result = gush("plan", "quick", "--json", tmp_path / "plan.json")
     assert result.exit_code == 0, result.output
     data = json.loads((tmp_path / "plan.json").read_text())
-    assert data["points"] > data["elements"] > 0 and data["expected_steps"] <= data["steps_at_most"]
+    assert data["points"] > data["elements"] > 0 and data["expected_steps"] <= data["steps_to_stop_time"]
     left_out = {row["feature"]: row["reason"] for row in data["features"] if not row["active"]}
     assert left_out["motion of the lining"] == "lining = 'fixed'"
 

@@ -134,6 +134,7 @@ def test_sand_that_is_not_pressed_together_is_at_the_tip_of_the_cone(event):  # 
     # a few per cent of the points, though more of the point-steps: points that flow are small and step often
     assert 0.001 < records[-1].tip_fraction < 0.2
     values = {"tip_fraction": 0.02, "clamps": {"tension": 0.14, "cavitated": 0.03, "porosity_floor": 0.0}}
+    assert states_line({"clamps": {}}) == "none"
     assert states_line(values) == (
         "tip of the Mohr-Coulomb cone 2.0% of points, 14.00% of point-steps; pores not full 3.00% of point-steps"
     )

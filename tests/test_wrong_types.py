@@ -63,6 +63,26 @@ def test_solver_refuses_what_is_no_number_of_threads():
         mpm.Solver(None, None, threads=0)
 
 
+def test_ground_alone_says_which_scene_it_takes():
+    import mpm
+
+    whole = coupling.load_scene("quick")
+    for given, hint in ((whole, "got a Scene; give its .mpm"), ("quick", r"got a str; coupling.load_scene\('quick'\)")):
+        for use in (mpm.build_mesh, lambda scene: mpm.Solver(scene, None), lambda scene: next(mpm.simulate(scene))):
+            with pytest.raises(ValueError, match=f"scene: must be an mpm.Scene, {hint}"):
+                use(given)
+
+
+@pytest.mark.parametrize("model", [structure.BeamSpringLining, structure.ContinuumLining])
+def test_lining_models_say_what_they_take(model):
+    scene = coupling.load_scene("quick")
+    for given, hint in ((scene, "got a Scene; give its .ring"), (None, "got a NoneType; make one")):
+        with pytest.raises(structure.InputError, match=rf"ring: must be a structure\.Ring, {hint}"):
+            model(given)
+    with pytest.raises(ValueError, match=r"pressures: must be an xarray\.Dataset of soil_pressure.*, got a list"):
+        model(scene.ring).respond([1e5, 1e5])
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [

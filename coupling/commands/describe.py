@@ -62,16 +62,18 @@ def _study(path):
     from coupling.studies.execute import case_file
 
     plan, cases, failures = stored_cases(path)
+    finished = sum(case_file(path, case).is_file() for case in cases)
+    go_on = [f"gush study {path}"] if finished < len(cases) else []
     facts = {
         "name": plan.name,
         "scene": plan.scene,
         "parameters": ", ".join(plan.parameters),
         "cases": len(cases),
-        "finished": sum(case_file(path, case).is_file() for case in cases),
+        "finished": finished,
         "failed": len(failures),
         "lining models": ", ".join(plan.backends),
     }
-    return {"kind": "study folder", "facts": facts, "next": [f"gush report {path}"]}
+    return {"kind": "study folder", "facts": facts, "next": [*go_on, f"gush report {path}"]}
 
 
 def _file(path):

@@ -49,7 +49,8 @@ def _feature_table(data):
 
 
 def _cost_table(data):
-    most = "no stop time given" if data["steps_at_most"] is None else f"{data['steps_at_most']} until the stop time"
+    most = data["steps_to_stop_time"]
+    most = "no stop time given" if most is None else f"{most} until the stop time"
     table = Table("cost", "", title=f"{data['scene']}: what it costs")
     free = data["free_memory_bytes"]
     meshed = "nodes" in data

@@ -13,10 +13,15 @@ from structure.response import SHOWN
 
 def study_command(
     study: Annotated[
-        str, typer.Argument(help="A built-in study (table-2, sensitivity, permeability, mesh, backend) or a TOML file.")
+        str,
+        typer.Argument(
+            help="A built-in study (table-2, sensitivity, permeability, mesh, backend), a TOML file, or the folder "
+            "of a study that is to go on."
+        ),
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Folder; studies/NAME when left out. What is there is not rerun.")
+        Path | None,
+        typer.Option(help="Folder; that which goes on, or studies/NAME, when left out. What is there is not rerun."),
     ] = None,
     workers: Annotated[int | None, typer.Option(min=0, help="Processes; all cores when left out, 0: this one.")] = None,
     scheduler: Annotated[str | None, typer.Option(help="Address of a running dask scheduler to use instead.")] = None,

@@ -136,7 +136,8 @@ def states_line(values: Mapping[str, Any]) -> str:
     """The states and limits that points met, which are no errors, in one line for people."""
     points = {clamp: f"{values[name]:.1%} of points, " for name, clamp in STATES.items() if name in values}
     met = {name: share for name, share in values["clamps"].items() if share > 0}
-    return "; ".join(f"{CLAMPS[name]} {points.get(name, '')}{share:.2%} of point-steps" for name, share in met.items())
+    told = (f"{CLAMPS[name]} {points.get(name, '')}{share:.2%} of point-steps" for name, share in met.items())
+    return "; ".join(told) or "none"
 
 
 def poor_errors(values: Mapping[str, Any]) -> list[str]:

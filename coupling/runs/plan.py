@@ -44,11 +44,11 @@ def plan(
     dict
         scene; features: list of {feature, active, reason}; initial_k0: see :func:`initial_k0`; elements, nodes, points;
         min_altitude [m]; min_angle [degree]; dt [s]; dt_limit; stop_time [s] or None; stop_inflow_mass [kg/m] or None;
-        steps_at_most (None without a stop time); expected_time [s] and expected_steps: rough where the run stops at an
-        inflow mass; steps are those of the smallest elements, cut to the output interval; expected_point_steps: updates
-        of one point by one step; records; memory_bytes, free_memory_bytes; point_steps_per_second: measured now;
-        expected_seconds: of stepping, without mesh, relaxation and pictures. Steps are counted with the step of the
-        initial state.
+        steps_to_stop_time (None without a stop time); expected_time [s] and expected_steps: rough where an inflow mass
+        stops the run; steps are those of the smallest elements, cut to the output interval; expected_point_steps:
+        updates of one point by one step; records; memory_bytes, free_memory_bytes; point_steps_per_second: measured
+        now; expected_seconds: of stepping, without mesh, relaxation and pictures. Steps are counted with the step of
+        the initial state; where ground flows it becomes up to a third shorter.
     """
     import mpm
 
@@ -74,7 +74,7 @@ def plan(
         "dt_limit": limit,
         "stop_time": stop.time,
         "stop_inflow_mass": stop.inflow_mass,
-        "steps_at_most": most,
+        "steps_to_stop_time": most,
         "expected_time": time,
         "expected_steps": steps,
         "expected_point_steps": point_steps,
@@ -145,7 +145,7 @@ def rough_plan(
     -------
     dict
         Keys of :func:`plan` that need no mesh: scene, features, initial_k0, elements, points, dt [s], stop_time [s],
-        stop_inflow_mass [kg/m], steps_at_most, expected_time [s], expected_steps, records, memory_bytes,
+        stop_inflow_mass [kg/m], steps_to_stop_time, expected_time [s], expected_steps, records, memory_bytes,
         free_memory_bytes. Elements, points and dt are right within a factor of three where the mesh is regular.
 
     Raises
@@ -174,7 +174,7 @@ def rough_plan(
         "dt": dt,
         "stop_time": s.stop.time,
         "stop_inflow_mass": s.stop.inflow_mass,
-        "steps_at_most": None if s.stop.time is None else _rough_steps(dt, s.output.interval, s.stop.time),
+        "steps_to_stop_time": None if s.stop.time is None else _rough_steps(dt, s.output.interval, s.stop.time),
         "expected_time": time,
         "expected_steps": None if time is None else _rough_steps(dt, s.output.interval, time),
         "records": None if time is None else 1 + _intervals(s.output.interval, time)[0],
@@ -210,11 +210,13 @@ def expected_time(mpm_scene: MpmScene) -> float | None:
     water = mpm_scene.water
     head = max(depth - water.table_depth, 0.1 * depth) if water is not None else mpm_scene.gate.width
     soil = [layer for layer in mpm_scene.soils if layer.top_depth <= depth][-1]
-    discharge = math.sqrt(2 * mpm_scene.gravity * head) * mpm_scene.gate.width
-    inflow_rate = DISCHARGE_SHARE * discharge * (1 - soil.porosity) * soil.grain_density
+    velocity = DISCHARGE_SHARE * math.sqrt(2 * mpm_scene.gravity * head)
+    inflow_rate = velocity * mpm_scene.gate.width * (1 - soil.porosity) * soil.grain_density
     if inflow_rate == 0:
         return stop.time
-    time = stop.inflow_mass / inflow_rate
+    # the rate grows evenly for twice the delay, in which grains fall freely up to that velocity
+    delay, steady = velocity / (2 * mpm_scene.gravity), stop.inflow_mass / inflow_rate
+    time = steady + delay if steady > delay else 2 * math.sqrt(delay * steady)
     return time if stop.time is None else min(time, stop.time)
 
 

@@ -51,6 +51,11 @@ def _converted(table, units, location):
     return numbers, mistakes
 
 
+def ring_unit(location: tuple[str, ...]) -> str | None:
+    """Unit of a key of [ring], None where it has none."""
+    return (GROUND if "ground" in location else RING).get(location[-1] if len(location) > 1 else "")
+
+
 def ring_number(location: tuple[str, ...], value: Any) -> Any:
     """A value of [ring] as a number in its unit; `location` as ("ring", "ground", "cohesion").
 
@@ -59,7 +64,7 @@ def ring_number(location: tuple[str, ...], value: Any) -> Any:
     ValueError
         As :func:`mpm.scene.quantity_in`.
     """
-    unit = (GROUND if "ground" in location else RING).get(location[-1] if len(location) > 1 else "")
+    unit = ring_unit(location)
     if unit is None:
         return value
     per_metre = unit.removesuffix("/m")

@@ -30,9 +30,10 @@ from coupling.scenes.layers import (
 )
 from coupling.scenes.mistakes import mistake_line
 from coupling.scenes.plausibility import hints
-from coupling.scenes.ring_units import ring_in_si, ring_number
+from coupling.scenes.ring_units import ring_in_si, ring_number, ring_unit
 from coupling.scenes.rings import derived_ring
 from mpm.scene import Scene as MpmScene
+from mpm.scene import quantity_in
 from structure.inputs import Input, mistakes, models_in, shortened, table_html
 from structure.ring import Ring
 
@@ -270,22 +271,32 @@ def number_in_unit(name: str, value: Any) -> Any:
     ValueError
         As :func:`mpm.scene.quantity_in`.
     """
-    parts = [part for part in name.split(".") if not part.isdecimal()]
+    parts = _without_numbers(name)
+    if parts[0] == "ring":
+        return ring_number(tuple(parts), value)
+    unit = unit_of(name)
+    return value if unit is None else quantity_in(unit, value)
+
+
+def unit_of(name: str) -> str | None:
+    """Unit of the key of a dotted name, as pint reads it; None where it has none, or where there is no such key."""
+    parts = _without_numbers(name)
+    if parts[0] == "ring":
+        return ring_unit(tuple(parts))
     try:
-        if parts[0] == "ring":
-            return ring_number(tuple(parts), value)
         model = MpmScene
         for part in parts[:-1]:
             model = next(models_in(model.model_fields[part].annotation))
         field = model.model_fields[parts[-1]]
     except (KeyError, StopIteration):
-        return value  # no such key: the scene says so
+        return None
     kinds = (field, *getattr(field.annotation, "__args__", ()))
     metadata = [each for kind in kinds for each in getattr(kind, "metadata", getattr(kind, "__metadata__", ()))]
-    for validator in metadata:
-        if isinstance(validator, BeforeValidator):
-            return validator.func(value)
-    return value
+    return next((each.func.args[0] for each in metadata if isinstance(each, BeforeValidator)), None)
+
+
+def _without_numbers(name):
+    return [part for part in name.split(".") if not part.isdecimal()]
 
 
 def _without(table: dict[str, Any], derived: dict[str, Any]) -> dict[str, Any]:

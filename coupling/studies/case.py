@@ -40,7 +40,7 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, 
         As :func:`coupling.run`; the study goes on without the case.
     """
 
-    from coupling.datasets import read_history, read_pressures, write_responses
+    from coupling.datasets import read_history, read_pressures, write_dataset, write_responses
     from coupling.datasets.geometry import on_tunnel
     from coupling.files.folder import RUN_FILE
     from coupling.files.provenance import root_attributes
@@ -80,7 +80,7 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, 
     result = at_inflow_masses(on_tunnel(pressures), history, responses, np.linspace(0.0, last, records))
     result.attrs = root_attributes(scene)
     with replaced(done) as beside:
-        result.to_netcdf(beside, engine="h5netcdf")
+        write_dataset(beside, result)
     report.end()
     return str(done)
 
@@ -162,9 +162,13 @@ def _at(dataset, times):
     """A dataset at some times, NaN where the time is NaN, with the dimension `progress` in place of time."""
     import xarray as xr
 
-    points = xr.DataArray(np.nan_to_num(times, nan=float(dataset["time"][0])), dims="progress")
-    there = xr.DataArray(np.isfinite(times), dims="progress")
-    picked = dataset.interp(time=points, assume_sorted=True).where(there)
-    for name in picked.data_vars:
-        picked[name].attrs = dict(dataset[name].attrs)
-    return picked.drop_vars("time")
+    known, stored = np.isfinite(times), dataset["time"].values
+    times = np.where(known, times, stored[0])
+    after = np.minimum(np.searchsorted(stored, times), len(stored) - 1)
+    before = np.maximum(after - 1, 0)
+    width = np.where(after > before, stored[after] - stored[before], 1.0)
+    share = xr.DataArray((times - stored[before]) / width, dims="progress")
+    values = dataset.drop_vars("time")
+    low, high = (values.isel(time=xr.DataArray(rows, dims="progress")) for rows in (before, after))
+    with xr.set_options(keep_attrs=True):
+        return (low + share * (high - low)).where(xr.DataArray(known, dims="progress"))

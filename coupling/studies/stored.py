@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -24,16 +23,20 @@ def run_study(name, out, workers, scheduler, console):
         parameters, status, message, cpu_seconds [s], and at the last inflow mass reached: inflow_mass [kg/m], time [s],
         axial_force [N/m] and bending_moment [N m/m] of that model as {max, min}, None without a ring.
     """
+    from coupling.datasets import write_dataset
     from coupling.studies.design import cases, load_study
-    from coupling.studies.execute import DATA_FILE, study
+    from coupling.studies.execute import DATA_FILE, study, study_folder
     from coupling.studies.progress import StudyLine
 
     plan = load_study(name)
-    folder = Path(out) if out is not None else Path("studies") / plan.name
+    folder = study_folder(name, plan, out)
     with StudyLine(console) as line:
         dataset = study(plan, folder, workers, scheduler, partial(console.print, highlight=False, soft_wrap=True), line)
     with replaced(folder / DATA_FILE) as beside:
-        dataset.to_netcdf(beside, engine="h5netcdf")
+        if dataset.chunks:  # of a large study, loaded piece by piece
+            dataset.to_netcdf(beside, engine="h5netcdf")
+        else:
+            write_dataset(beside, dataset)
     rows = []
     for case in cases(plan):
         one = dataset.sel(case=case.index)
