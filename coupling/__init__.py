@@ -3,15 +3,15 @@
 Names load on first use, so that ``import coupling`` and ``gush --help`` stay fast.
 """
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from coupling.datasets import read_run
-    from coupling.run import run
-    from coupling.scene import Scene, SceneError, load_scene, make_scene, scene_names
+    from coupling.refused import SceneError
+    from coupling.runs.run import run
+    from coupling.scenes.layers import scene_names
+    from coupling.scenes.scene import Scene, load_scene, make_scene
     from coupling.studies.collect import read_study
     from coupling.studies.execute import study
     from structure.inputs import GushingWarning
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "GushingWarning": "structure.inputs",
-    "Scene": "coupling.scene",
-    "SceneError": "coupling.scene",
-    "load_scene": "coupling.scene",
-    "make_scene": "coupling.scene",
-    "scene_names": "coupling.scene",
-    "run": "coupling.run",
+    "Scene": "coupling.scenes.scene",
+    "SceneError": "coupling.refused",
+    "load_scene": "coupling.scenes.scene",
+    "make_scene": "coupling.scenes.scene",
+    "scene_names": "coupling.scenes.layers",
+    "run": "coupling.runs.run",
     "read_run": "coupling.datasets",
     "study": "coupling.studies.execute",
     "read_study": "coupling.studies.collect",
@@ -57,14 +57,3 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *_HOMES, "__version__"})
-
-
-class _Package(ModuleType):
-    """Keeps ``coupling.run`` the function: importing the module of that name would put the module in its place."""
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if not (name in _HOMES and isinstance(value, ModuleType)):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package

@@ -12,7 +12,7 @@ from mpm.filling import crossing, fill_faces, relax
 from mpm.half_model import with_mirror_image
 from mpm.mesh import Mesh, MeshError, altitudes
 from mpm.outline import Outline, draw_headroom, draw_scene, horizontal_lines
-from mpm.scene import Scene
+from mpm.scene import Scene, check_scene
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -44,6 +44,7 @@ def build_mesh(scene: Scene) -> Mesh:
     MeshError
         When a triangle would be much flatter than the size asked for, or gmsh or its system libraries fail.
     """
+    check_scene(scene)
     best: tuple[float, NDArray[np.float64], Outline, NDArray[np.int64]] | None = None
     failure = MeshError("mesh: channel and rows along the linings must not fold, got none that fit; refine the linings")
     for rows, algorithm in ATTEMPTS:

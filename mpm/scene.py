@@ -683,6 +683,18 @@ class Scene(Part):
         return self.estimated_elements * (1500 + 600 * self.discretisation.points_per_element)
 
 
+def check_scene(scene: object) -> None:
+    """Refuse what is no scene.
+
+    Raises
+    ------
+    ValueError
+    """
+    if not isinstance(scene, Scene):
+        hint = "give its .mpm" if hasattr(scene, "mpm") else "coupling.load_scene('quick').mpm is one"
+        raise ValueError(f"scene: must be an mpm.Scene, got a {type(scene).__name__}; {hint}")
+
+
 def _physical_memory():
     """Memory of this machine [bytes]; infinite where the system does not tell."""
     try:

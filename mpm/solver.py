@@ -44,6 +44,7 @@ from mpm.points import (
     porosity_ranges,
     sort_by_element,
 )
+from mpm.scene import check_scene
 from mpm.spectrum import Spectrum, spectral_time_step
 from mpm.system import Ground, Medium, Net, System, Tally, Walls
 from mpm.tables import element_geometry, element_neighbours, outflow_nodes, soil_table
@@ -114,6 +115,7 @@ class Solver(Measures):
 
     def __init__(self, scene, mesh, threads=None):
         check_threads(threads)
+        check_scene(scene)
         if scene.is_half:
             mesh = right_half(mesh)
         self.copies = 2 if scene.is_half else 1  # of what is computed, in the whole

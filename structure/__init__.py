@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from structure.beam_spring import BeamSpringLining
+    from structure.capacity import SegmentSection
     from structure.checks import CapacityRule, Limits, check
     from structure.continuum import ContinuumLining
     from structure.continuum_bolts import Bolts
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from structure.lining import LiningFailure, LiningModel, additional
     from structure.models import lining_model, lining_model_names, register_lining_model
     from structure.ring import Ground, Ring
-    from structure.sections import SegmentSection
     from structure.theory import theoretical_pressures
 
     __version__: str
@@ -32,7 +32,7 @@ _HOMES = {
     "check": "structure.checks",
     "Limits": "structure.checks",
     "CapacityRule": "structure.checks",
-    "SegmentSection": "structure.sections",
+    "SegmentSection": "structure.capacity",
     "BeamSpringLining": "structure.beam_spring",
     "ContinuumLining": "structure.continuum",
     "Gate": "structure.continuum_mesh",

@@ -16,9 +16,17 @@ from structure.beam_geometry import (
     traction_operator,
 )
 from structure.equilibrium import NoEquilibrium, RingEquilibrium
-from structure.lining import SIDES, THETA, LiningFailure, LiningModel, check_pressures, response_dataset
-from structure.ring import Ring
-from structure.springs import joint_spring, limit_pressures
+from structure.lining import (
+    SIDES,
+    THETA,
+    LiningFailure,
+    LiningModel,
+    check_pressures,
+    response_dataset,
+    ring_attributes,
+)
+from structure.ring import Ring, check_ring
+from structure.springs import joint_spring
 
 
 class BeamSpringLining(LiningModel):
@@ -37,6 +45,7 @@ class BeamSpringLining(LiningModel):
     """
 
     def __init__(self, ring: Ring):
+        check_ring(ring)
         self.ring = ring
         self.mesh = RingMesh(ring)
         self._invert = int(np.argmin(np.abs((self.mesh.node_angle % (2 * np.pi)) - np.pi)))
@@ -69,7 +78,7 @@ class BeamSpringLining(LiningModel):
         fields |= self._balances(displacements, slips, loads, springs)
         fields["shear_moment_residual"] = self._shear_moment_residual(of_elements, theta, shear, springs)
         fields |= self._movements(displacements)
-        return self._dataset(ordered, fields, times)
+        return response_dataset(self.ring, ordered, fields, ring_attributes(self.ring, "beam-spring"))
 
     def _loads(self, theta, pressure, shear):
         """Nodal forces of pressures and weight at every time, and the uplift balanced among them."""
@@ -218,26 +227,3 @@ class BeamSpringLining(LiningModel):
             "convergence_vertical": -(crown + invert),
             "settlement": -up[:, 0],
         }
-
-    def _dataset(self, pressures, fields, times):
-        joints = np.array(self.ring.joint_angles, dtype=float)
-        coordinates = {
-            "time": ("time", times),
-            "theta": ("theta", THETA),
-            "joint": ("joint", np.arange(1, len(joints) + 1)),
-            "joint_angle": ("joint", joints),
-        }
-        attributes = {
-            "Conventions": "CF-1.11",
-            "title": "response of the lining: beam-spring model",
-            "model": "beam-spring",
-            "ring": self.ring.model_dump_json(),
-        }
-        if self.ring.ground is not None:
-            normal, tangential = limit_pressures(self.ring.ground)
-            attributes["limit_pressures"] = f"normal {normal:.6g} Pa, tangential {tangential:.6g} Pa"
-        response = response_dataset(fields, coordinates, attributes)
-        response["time"].attrs |= pressures["time"].attrs
-        if "inflow_mass" in pressures:
-            response = response.assign_coords(inflow_mass=pressures["inflow_mass"])
-        return response

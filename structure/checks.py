@@ -11,8 +11,8 @@ import numpy as np
 import xarray as xr
 from pydantic import Field, ValidationError, model_validator
 
+from structure.capacity import SegmentSection, interaction, moment_utilisation, radial_utilisation
 from structure.inputs import Input, InputError, mistakes, refusal
-from structure.sections import SegmentSection, interaction, moment_utilisation, radial_utilisation
 
 #: name: what it is, for figures and tables.
 UTILISATIONS = {

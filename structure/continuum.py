@@ -16,9 +16,17 @@ from structure.continuum_mesh import EDGE_MEAN, ContinuumMesh, GasketGroove, Gat
 from structure.continuum_sections import section_displacements, section_forces
 from structure.continuum_stiffness import Concrete, joint_operators, joint_stiffness, nodes_from_unknowns
 from structure.equilibrium import NoEquilibrium
-from structure.lining import SIDES, THETA, LiningFailure, LiningModel, check_pressures, response_dataset
-from structure.ring import Ring
-from structure.springs import joint_spring, limit_pressures
+from structure.lining import (
+    SIDES,
+    THETA,
+    LiningFailure,
+    LiningModel,
+    check_pressures,
+    response_dataset,
+    ring_attributes,
+)
+from structure.ring import Ring, check_ring
+from structure.springs import joint_spring
 
 #: Name: (dimensions, units, long name) of the stress dataset.
 STRESSES = {
@@ -81,6 +89,7 @@ class ContinuumLining(LiningModel):
         gate = None if gate is None else Gate(*gate)
         groove = None if groove is None else GasketGroove(*groove)
         bolts = None if bolts is None else Bolts(*bolts)
+        check_ring(ring)
         _refuse_unsupported(ring)
         _refuse_options(ring, columns, layers, joint, strip_width, gate)
         if groove is not None:
@@ -142,7 +151,6 @@ class ContinuumLining(LiningModel):
 
     def respond(self, pressures: xr.Dataset) -> xr.Dataset:
         ordered = check_pressures(pressures, self.ring)
-        times = ordered["time"].values
         unknowns, loads, fields = self._solve(ordered)
         displacements = (self._to_nodes @ unknowns.T).T
         fields |= self._internal_forces(unknowns, displacements)
@@ -150,7 +158,7 @@ class ContinuumLining(LiningModel):
         fields |= self._balances(unknowns, loads)
         fields["shear_moment_residual"] = self._shear_moment_residual(fields, ordered, unknowns)
         fields |= self._movements(displacements)
-        response = self._dataset(ordered, fields, times)
+        response = response_dataset(self.ring, ordered, fields, self._attributes())
         if self.bolts is not None:
             response["joint_bolt_force"] = ("time", "joint"), self._bolt_force(unknowns), BOLT_FORCE
         return response
@@ -378,10 +386,7 @@ class ContinuumLining(LiningModel):
         }
 
     def _attributes(self):
-        attributes = {
-            "Conventions": "CF-1.11",
-            "model": "continuum",
-            "ring": self.ring.model_dump_json(),
+        attributes = ring_attributes(self.ring, "continuum") | {
             "mesh": f"{len(self.mesh.column_lines)} columns, {self.mesh.layers} layers of 9-node quadrilaterals",
             "joint_model": self.joint,
         }
@@ -391,25 +396,7 @@ class ContinuumLining(LiningModel):
         for name, detail in (("groove", self.groove), ("bolts", self.bolts)):
             if detail is not None:
                 attributes[name] = ", ".join(f"{part} {value:g}" for part, value in detail._asdict().items())
-        if self.ring.ground is not None:
-            normal, tangential = limit_pressures(self.ring.ground)
-            attributes["limit_pressures"] = f"normal {normal:.6g} Pa, tangential {tangential:.6g} Pa"
         return attributes
-
-    def _dataset(self, pressures, fields, times):
-        joints = np.array(self.ring.joint_angles, dtype=float)
-        coordinates = {
-            "time": ("time", times),
-            "theta": ("theta", THETA),
-            "joint": ("joint", np.arange(1, len(joints) + 1)),
-            "joint_angle": ("joint", joints),
-        }
-        attributes = {"title": "response of the lining: continuum model"} | self._attributes()
-        response = response_dataset(fields, coordinates, attributes)
-        response["time"].attrs |= pressures["time"].attrs
-        if "inflow_mass" in pressures:
-            response = response.assign_coords(inflow_mass=pressures["inflow_mass"])
-        return response
 
 
 def _magnitude(forces: np.ndarray) -> float:

@@ -7,7 +7,7 @@ from scipy import sparse
 from scipy.linalg import lapack
 
 from structure.banded import SMALLEST_PIVOT
-from structure.equilibrium import LARGEST_DISPLACEMENT, MAX_ITERATIONS, RESIDUAL_TOLERANCE, NoEquilibrium
+from structure.equilibrium import LARGEST_DISPLACEMENT, MAX_ITERATIONS, RESIDUAL_TOLERANCE, NoEquilibrium, convex_step
 from structure.ring import Ring
 from structure.ring_forces import TANGENT_FLOOR
 from structure.springs import soil_reaction, soil_springs
@@ -159,7 +159,9 @@ class SpringEquilibrium:
                 self.iterations.append(iteration)
                 return displacement
             step = self._direction(out_of_balance, tangents)
-            displacement, out_of_balance, tangents = self._advance(displacement, step, out_of_balance, loads)
+            displacement, out_of_balance, tangents = convex_step(
+                lambda moved: self.residual(moved, loads), displacement, step, out_of_balance
+            )
             largest = np.abs(displacement).max()
             if not largest <= self.largest:
                 raise NoEquilibrium(
@@ -170,22 +172,6 @@ class SpringEquilibrium:
             f"the largest out-of-balance force is still {np.abs(out_of_balance).max():.3g} N/m after {MAX_ITERATIONS}"
             f" iterations (wanted {tolerance:.3g}): the loads are close to what the ground can carry"
         )
-
-    def _advance(self, displacement, step, out_of_balance, loads):
-        work = out_of_balance @ step
-        low, high, share = 0.0, 1.0, 1.0
-        for _ in range(30):
-            moved = displacement + share * step
-            residual, tangents = self.residual(moved, loads)
-            left = residual @ step
-            if left >= -0.5 * work:
-                if share == 1.0 or left <= 0.5 * work:
-                    break
-                low = share
-            else:
-                high = share
-            share = (low + high) / 2
-        return moved, residual, tangents
 
 
 def _lower_part(matrix, place, free):

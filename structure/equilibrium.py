@@ -128,26 +128,8 @@ class RingEquilibrium(RingForces):
         )
 
     def _advance_convex(self, displacement, solver, out_of_balance, loads, slip):
-        """One Newton step; where it overshoots, the root of the residual's work along it is found by bisection.
-
-        Overshooting: the work changes sign and does not halve. The forces derive from a convex energy, so this cannot
-        cycle.
-        """
         step = solver(out_of_balance)
-        work = out_of_balance @ step
-        low, high, share = 0.0, 1.0, 1.0
-        for _ in range(30):
-            moved = displacement + share * step
-            residual, tangents = self.residual(moved, loads, slip)
-            left = residual @ step
-            if left >= -0.5 * work:
-                if share == 1.0 or left <= 0.5 * work:
-                    break
-                low = share
-            else:
-                high = share
-            share = (low + high) / 2
-        return moved, residual, tangents
+        return convex_step(lambda moved: self.residual(moved, loads, slip), displacement, step, out_of_balance)
 
     def _advance(self, displacement, solver, out_of_balance, loads, slip):
         """One Newton step, halved until the step that the same tangent would take next is shorter.
@@ -169,3 +151,28 @@ class RingEquilibrium(RingForces):
     def _length(self, step):
         nodal = step.reshape(-1, 3)
         return np.sqrt((nodal[:, :2] ** 2).sum() + (self.ring.centre_radius * nodal[:, 2]) ** 2 @ np.ones(len(nodal)))
+
+
+def convex_step(residual, displacement, step, out_of_balance):
+    """One Newton step; where it overshoots, the root of the residual's work along it is found by bisection.
+
+    Overshooting: the work changes sign and does not halve. The forces derive from a convex energy, so this cannot
+    cycle.
+
+    Returns
+    -------
+    The new displacement, and what `residual` gives there.
+    """
+    work = out_of_balance @ step
+    low, high, share = 0.0, 1.0, 1.0
+    for _ in range(30):
+        moved = displacement + share * step
+        left, tangents = residual(moved)
+        if left @ step >= -0.5 * work:
+            if share == 1.0 or left @ step <= 0.5 * work:
+                break
+            low = share
+        else:
+            high = share
+        share = (low + high) / 2
+    return moved, left, tangents

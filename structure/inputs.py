@@ -158,7 +158,7 @@ def _message(item: Any, model: type[BaseModel], extra_names: tuple[str, ...]) ->
     message = item["msg"].removeprefix("Value error, ")
     if kind == "value_error":
         return message
-    rule = message.replace("Input should", "must", 1)
+    rule = message.replace("Input should", "must", 1).replace("be a valid tuple", "be a list")
     if kind in ("model_type", "dict_type"):
         rule = "must be a table"
     limits = item.get("ctx", {})

@@ -2,7 +2,7 @@
 
 Linear springs, or any of three limits that a dry joint has: it opens (no tension), it rotates about a shrinking contact
 zone once its edge decompresses (Janssen), and it slides when friction is used up (Coulomb).
-Signs as in :mod:`structure.lining`; everything per metre of tunnel.
+Signs as in :mod:`structure.response`; everything per metre of tunnel.
 """
 
 from __future__ import annotations

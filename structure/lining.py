@@ -1,75 +1,26 @@
-"""What every lining model takes and gives: input checks, response variables with units, and the sign conventions.
-
-Signs, in one place:
-
-- Angles theta run clockwise from the crown; s is the arc length of the centre line in that direction.
-- Soil and water pressure push inward; soil shear positive drags the lining clockwise. All act on the outer face.
-- N compression positive; M positive with tension on the outer face; Q = -dM/ds - m, with m the
-  clockwise couple per arc that shear on the outer face brings half a thickness from the centre line: Q positive where
-  the part at larger s pushes the part at smaller s inward.
-- Radial displacement outward, tangential displacement and rotation clockwise positive.
-- Joint opening positive for a gap; N = -k_n opening in a linear joint. Joint rotation positive when the joint opens on
-  the outside; M = k_theta rotation. Joint dislocation positive when the clockwise segment steps inward;
-  Q = k_s dislocation. Nonlinear joints (:mod:`structure.joint_laws`) start with these slopes.
-- Convergence positive when the diameter shortens; settlement downward positive.
-"""
+"""What every lining model takes and gives: the template, and its response as a dataset; signs: `structure.response`."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
 from structure.pressures import PRESSURES, check_pressures
+from structure.response import COORDINATES, NOT_ADDITIONAL, RESPONSE
+from structure.springs import limit_pressures
 
-__all__ = ["PRESSURES", "check_pressures"]  # of `structure.pressures`, for models
+if TYPE_CHECKING:
+    from structure.ring import Ring
+
+__all__ = ["PRESSURES", "RESPONSE", "check_pressures"]  # of other modules, for models
 
 #: Angles of every response [degree]: those of the pressures of a run, so that the two meet in one expression.
 THETA = np.arange(360.0)
 #: Both sides of an angle [rad]: at a joint the mean of the two is given.
 SIDES = (-1e-9, 1e-9)
-
-#: name: (dimensions, units, long name)
-RESPONSE = {
-    "axial_force": (("time", "theta"), "N/m", "axial force per metre of tunnel, compression positive"),
-    "shear_force": (("time", "theta"), "N/m", "shear force per metre of tunnel, Q = -dM/ds"),
-    "bending_moment": (("time", "theta"), "N m/m", "bending moment per metre of tunnel, tension outside positive"),
-    "displacement_radial": (("time", "theta"), "m", "radial displacement of the lining, outward positive"),
-    "displacement_tangential": (("time", "theta"), "m", "tangential displacement of the lining, clockwise positive"),
-    "joint_axial_force": (("time", "joint"), "N/m", "axial force in the joint, compression positive"),
-    "joint_shear_force": (("time", "joint"), "N/m", "shear force in the joint, Q = -dM/ds"),
-    "joint_bending_moment": (("time", "joint"), "N m/m", "bending moment in the joint, tension outside positive"),
-    "joint_opening": (("time", "joint"), "m", "joint opening on the centre line, gap positive"),
-    "joint_dislocation": (("time", "joint"), "m", "joint dislocation, clockwise segment inward positive"),
-    "joint_rotation": (("time", "joint"), "rad", "joint rotation, opening on the outside positive"),
-    "convergence_horizontal": (("time",), "m", "shortening of the horizontal diameter"),
-    "convergence_vertical": (("time",), "m", "shortening of the vertical diameter"),
-    "settlement": (("time",), "m", "mean downward displacement of the ring"),
-    "equilibrium_residual": (("time",), "1", "unbalanced force on the ring or a node over the sum of all nodal loads"),
-    "shear_moment_residual": (("time",), "N/m", "largest departure from Q + dM/ds + couple of outer-face shear = 0"),
-    "load_sum_horizontal": (("time",), "N/m", "horizontal sum of pressures, weight and balance, right positive"),
-    "load_sum_vertical": (("time",), "N/m", "vertical sum of pressures, weight and balance, up positive"),
-    "spring_sum_horizontal": (("time",), "N/m", "horizontal sum of soil springs and support, right positive"),
-    "spring_sum_vertical": (("time",), "N/m", "vertical sum of soil springs and support, up positive"),
-    "balanced_uplift": (("time",), "N/m", "vertical sum of pressures and weight balanced by radial soil pressure"),
-    "unborne_resultant": (
-        ("time",),
-        "1",
-        "force or torque that nothing bears, taken out evenly, over the sum of loads",
-    ),
-}
-
-#: Variables of a response that are no state of the ring: their change since the first record says nothing.
-NOT_ADDITIONAL = ("equilibrium_residual", "shear_moment_residual", "unborne_resultant", "inflow_mass")
-
-#: name: (units, long name)
-COORDINATES = {
-    "time": ("s", "time since the gate opened"),
-    "theta": ("degree", "angle from the crown, clockwise"),
-    "joint": ("1", "joint number, clockwise from the crown"),
-    "joint_angle": ("degree", "angle of the joint from the crown, clockwise"),
-}
 
 
 class LiningFailure(RuntimeError):
@@ -114,22 +65,38 @@ class LiningModel(ABC):
         """
 
 
-def response_dataset(
-    fields: dict[str, np.ndarray], coordinates: dict[str, tuple[str, np.ndarray]], attributes: dict[str, str]
-) -> xr.Dataset:
-    """Response with the schema's dimensions, units and names.
+def ring_attributes(ring: Ring, model: str) -> dict[str, str]:
+    """Where the answer of a lining model comes from: the model, the ring and what its ground bears."""
+    attributes = {"Conventions": "CF-1.11", "model": model, "ring": ring.model_dump_json()}
+    if ring.ground is not None:
+        normal, tangential = limit_pressures(ring.ground)
+        attributes["limit_pressures"] = f"normal {normal:.6g} Pa, tangential {tangential:.6g} Pa"
+    return attributes
 
-    fields : name of :data:`RESPONSE` to array;  coordinates : name to (dimension, array).
+
+def response_dataset(
+    ring: Ring, pressures: xr.Dataset, fields: dict[str, np.ndarray], attributes: dict[str, Any]
+) -> xr.Dataset:
+    """Response to pressures with the schema's dimensions, units and names.
+
+    fields : name of :data:`structure.response.RESPONSE` to array;  attributes : from :func:`ring_attributes`, and more.
     """
-    variables = {}
-    for name, values in fields.items():
-        dimensions, units, long_name = RESPONSE[name]
-        variables[name] = (dimensions, values, {"units": units, "long_name": long_name})
-    axes = {}
-    for name, (dimension, values) in coordinates.items():
-        units, long_name = COORDINATES[name]
-        axes[name] = (dimension, values, {"units": units, "long_name": long_name})
-    return xr.Dataset(variables, coords=axes, attrs=attributes)
+    variables = {name: (RESPONSE[name][0], values) for name, values in fields.items()}
+    joints = np.array(ring.joint_angles, dtype=float)
+    axes = {
+        "time": ("time", pressures["time"].values, pressures["time"].attrs),
+        "theta": ("theta", THETA),
+        "joint": ("joint", np.arange(1, len(joints) + 1)),
+        "joint_angle": ("joint", joints),
+    }
+    title = f"response of the lining: {attributes['model']} model"
+    response = xr.Dataset(variables, coords=axes, attrs={"title": title, **attributes})
+    for name, variable in response.variables.items():
+        units, long_name = RESPONSE[name][1:] if name in RESPONSE else COORDINATES[name]
+        variable.attrs = {"units": units, "long_name": long_name} | variable.attrs
+    if "inflow_mass" in pressures:
+        response = response.assign_coords(inflow_mass=pressures["inflow_mass"])
+    return response
 
 
 def at_whole_degrees(dataset: xr.Dataset, along: str = "theta") -> xr.Dataset:

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from structure.inputs import GushingWarning, shortened
+from structure.response import PRESSURES
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from structure.ring import Ring
 
-PRESSURES = ("soil_pressure", "water_pressure", "soil_shear")
 FEWEST_ANGLES = 8
 #: Between angles pressures are linear: what lies in a wider gap is not known [degree].
 WIDEST_GAP = 60.0
@@ -67,6 +67,11 @@ def check_pressures(pressures: xr.Dataset, ring: Ring | None = None) -> xr.Datas
 
 
 def _require_variables(pressures):
+    if not hasattr(pressures, "data_vars"):
+        raise ValueError(
+            f"pressures: must be an xarray.Dataset of {', '.join(PRESSURES)}, got a {type(pressures).__name__}; "
+            "structure.theoretical_pressures makes one"
+        )
     missing = [name for name in PRESSURES if name not in pressures]
     if missing:
         raise ValueError(

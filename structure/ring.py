@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from structure.inputs import Input
+from structure.inputs import Input, InputError
 from structure.plausibility import GROUND, RING, Usual, joints_in_radians
 
 
@@ -211,3 +211,15 @@ class Ring(Input):
         if self.section == "euler-bernoulli":
             return math.inf
         return 5 / 6 * self.concrete_modulus / (2 * (1 + self.concrete_poissons_ratio)) * self.thickness
+
+
+def check_ring(ring: object) -> None:
+    """Refuse what is no ring.
+
+    Raises
+    ------
+    InputError
+    """
+    if not isinstance(ring, Ring):
+        hint = "give its .ring" if hasattr(ring, "ring") else "make one: structure.Ring(outer_diameter=.., ..)"
+        raise InputError(f"ring: must be a structure.Ring, got a {type(ring).__name__}; {hint}")

@@ -1,6 +1,6 @@
 """What theory says of a lining beside its models: the pressures before it leaks, and the moment of a curved section.
 
-Signs as in :mod:`structure.lining`. The closed forms that rings are checked against are in
+Signs as in :mod:`structure.response`. The closed forms that rings are checked against are in
 `verification.problems.exact_rings`.
 """
 

@@ -7,7 +7,7 @@ import numpy as np
 
 import coupling
 from coupling import datasets
-from coupling.provenance import root_attributes
+from coupling.files.provenance import root_attributes
 from mpm.solver import RunFailed
 from verification.synthetic_run import TIMES, TwoTriangles, moving_record
 
@@ -31,7 +31,7 @@ def synthetic_run(scene, folder, **_):
 
 def write_study(folder, monkeypatch, backends=("beam-spring", "continuum"), **changes):
     """Run the study of two gates and two soils into a folder; `changes` of its definition."""
-    monkeypatch.setattr(sys.modules["coupling.run"], "run", synthetic_run)
+    monkeypatch.setattr(sys.modules["coupling.runs.run"], "run", synthetic_run)
     plan = {
         "name": "gates", "scene": "quick", "records": 5, "backends": backends, "fixed": {"stop.inflow_mass": 300.0},
         "parameters": {"gate.angle": [90.0, 45.0], "soils.0.friction_angle": [25.0, 35.0]}, **changes,

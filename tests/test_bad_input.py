@@ -9,10 +9,11 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 import coupling
-from coupling import SceneError, checkpoint, datasets
-from coupling.plan import plan, rough_plan
-from coupling.plausibility import warnings_of
-from coupling.scene_lines import line_of
+from coupling import SceneError, datasets
+from coupling.files import checkpoint
+from coupling.runs.plan import plan, rough_plan
+from coupling.scenes.lines import line_of
+from coupling.scenes.plausibility import warnings_of
 from verification.robustness import wild_scenes
 from verification.robustness.damaged_files import READERS, damaged, judged
 from verification.small_event import small_scene

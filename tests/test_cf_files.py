@@ -10,9 +10,10 @@ import pytest
 import xarray as xr
 
 import coupling
-from coupling import compare, datasets
-from coupling.pressure_source import read_source
-from coupling.provenance import PACKAGES
+from coupling import datasets
+from coupling.files.provenance import PACKAGES
+from coupling.responses import comparison as compare
+from coupling.responses.source import read_source
 from verification.synthetic_run import make_quick_scene, write_run
 
 GROUPS = ("lining", "history", "points", "mesh", "structure/beam_spring", "structure/continuum")

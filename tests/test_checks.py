@@ -9,10 +9,10 @@ import xarray as xr
 from test_ring_joints_and_springs import pressures, ring
 from test_sections import UNEQUAL, section
 
-from coupling import check_figures
+from coupling.figures import utilisations as check_figures
 from structure import BeamSpringLining, CapacityRule, InputError, Limits, additional, check
+from structure.capacity import interaction, radial_utilisation
 from structure.checks import UTILISATIONS
-from structure.sections import interaction, radial_utilisation
 
 RULE = dict(axial_force_factor=1.0, moment_factor=1.35, minimum_eccentricity=0.02, utilisation="radial")
 
@@ -164,7 +164,7 @@ def test_responses_that_lack_something_are_refused(response):
 def test_figure_shows_the_numbers_of_the_dataset(checked):
     diagram, history = check_figures.checks(checked).axes[:2]
     assert f"{checked['section_utilisation'].max().item():.2f}" in diagram.get_title()
-    assert diagram.get_xlabel() == "design bending moment [kN m/m]"
+    assert diagram.get_xlabel() == "design bending moment M [kN m/m]"
     clouds = np.concatenate([cloud.get_offsets() for cloud in diagram.collections])
     assert clouds[:, 0].max() == pytest.approx(checked["design_bending_moment"].max().item() / 1e3)
     assert history.get_xlabel() == "inflow mass [kg/m]"

@@ -16,10 +16,12 @@ import mpm
 from coupling import datasets
 from coupling.cli import app
 from coupling.figures import draw_run
-from coupling.plan import features
-from coupling.progress_line import ProgressLine
-from coupling.run import check_memory, run
-from coupling.run_folder import RunRefused, claimed, default_folder
+from coupling.files.folder import claimed, default_folder
+from coupling.refused import Refused
+from coupling.runs.memory import check_memory
+from coupling.runs.progress_line import ProgressLine
+from coupling.runs.run import run
+from coupling.scenes.features import features
 from verification.synthetic_run import make_quick_scene, record
 
 HEAVY = ("numba", "xarray", "matplotlib", "pint", "scipy", "skfem", "gmsh", "numpy")
@@ -96,7 +98,7 @@ def test_run_writes_everything_and_prints_a_table(simulated, tmp_path):
 
 
 def test_poor_error_is_a_warning_with_a_remedy_in_the_run_its_log_and_its_report(simulated, tmp_path, monkeypatch):
-    from coupling.quality import ERRORS
+    from coupling.postprocess.quality import ERRORS
 
     fine = gush("run", "quick", "--out", tmp_path / "fine")
     assert fine.exit_code == 0 and "warning: water lost" not in fine.output
@@ -221,8 +223,8 @@ def test_truncated_run_is_refused(simulated, tmp_path):
 
 
 def test_too_little_memory_is_refused(monkeypatch):
-    monkeypatch.setattr(sys.modules["coupling.run"], "free_memory_bytes", lambda: 1_000_000)
-    with pytest.raises(RunRefused, match="raise element_size"):
+    monkeypatch.setattr(sys.modules["coupling.runs.memory"], "free_memory_bytes", lambda: 1_000_000)
+    with pytest.raises(Refused, match="raise element_size"):
         check_memory(make_quick_scene().mpm)
 
 
@@ -278,7 +280,7 @@ def test_plan_says_what_is_left_out_and_why(tmp_path):
     result = gush("plan", "quick", "--json", tmp_path / "plan.json")
     assert result.exit_code == 0, result.output
     data = json.loads((tmp_path / "plan.json").read_text())
-    assert data["points"] > data["elements"] > 0 and data["expected_steps"] <= data["steps_at_most"]
+    assert data["points"] > data["elements"] > 0 and data["expected_steps"] <= data["steps_to_stop_time"]
     left_out = {row["feature"]: row["reason"] for row in data["features"] if not row["active"]}
     assert left_out["motion of the lining"] == "lining = 'fixed'"
 

@@ -9,7 +9,7 @@ import xarray as xr
 
 import coupling
 from coupling import datasets
-from coupling.provenance import root_attributes
+from coupling.files.provenance import root_attributes
 from verification.synthetic_run import lining, make_quick_scene, record
 
 
@@ -138,7 +138,7 @@ sys.path.insert(0, {str(__file__.rpartition("/")[0])!r})
 from verification.synthetic_run import make_quick_scene, record
 import coupling
 from coupling import datasets
-from coupling.provenance import root_attributes
+from coupling.files.provenance import root_attributes
 scene = make_quick_scene()
 writer = datasets.RunWriter({str(path)!r}, root_attributes(scene), scene.mpm)
 for k in range(5):

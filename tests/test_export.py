@@ -10,12 +10,12 @@ from typer.testing import CliRunner
 
 from coupling import datasets
 from coupling.cli import app
+from coupling.commands.describe import describe
 from coupling.export import export
-from coupling.info import describe
-from coupling.provenance import root_attributes
+from coupling.files.folder import claimed
+from coupling.files.provenance import root_attributes
 from coupling.report.page import write_report
-from coupling.run import respond
-from coupling.run_folder import claimed
+from coupling.responses.respond import respond
 from verification.synthetic_run import TwoTriangles, make_quick_scene, record
 
 TIMES = (0.0, 0.5, 1.0)

@@ -8,8 +8,8 @@ import pytest
 import xarray as xr
 
 from coupling import datasets, figures
-from coupling.provenance import root_attributes
-from coupling.run import respond
+from coupling.files.provenance import root_attributes
+from coupling.responses.respond import respond
 from verification.synthetic_run import TwoTriangles, make_quick_scene, record
 
 

@@ -11,7 +11,7 @@ from test_cli import gush
 import coupling
 import structure
 from coupling.datasets import RunFileError
-from coupling.pressure_source import read_source
+from coupling.responses.source import read_source
 from structure.pressures import WIDEST_GAP, check_pressures
 from verification.robustness.wild_pressures import judged, wild_pressures
 
@@ -206,3 +206,9 @@ def test_any_file_gives_what_was_meant_or_is_warned_of_or_refused(tmp_path):
         given, true, kind = wild_pressures(random.Random(number))
         given.assign_attrs(ring=RING.model_dump_json()).to_netcdf(tmp_path / "mine.nc", engine="h5netcdf")
         judged(tmp_path / "mine.nc", true, kind)
+
+
+def test_few_uneven_angles_in_gon_called_degrees_are_taken_as_written(tmp_path):
+    given, true, kind = wild_pressures(random.Random("0 1170"))  # eight of them, 4.8 to 345.3
+    given.assign_attrs(ring=RING.model_dump_json()).to_netcdf(tmp_path / "mine.nc", engine="h5netcdf")
+    assert judged(tmp_path / "mine.nc", true, kind) == "untold"

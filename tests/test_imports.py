@@ -14,20 +14,25 @@ FORBIDDEN = {
     "coupling": {"verification"},
     "verification": {"tests", "examples"},
 }
+#: Rooms of `coupling`: each imports only itself and those before it; the command line is last.
+ROOMS = (
+    "refused", "scenes", "files", "datasets", "postprocess", "responses", "figures", "export", "runs", "studies",
+    "report", "commands", "cli",
+)  # fmt: skip
 HEAVY = ("numba", "xarray", "matplotlib", "scipy", "gmsh", "skfem", "pint", "dask", "distributed", "h5py", "meshio")
 
 
 def imported(path: Path) -> set[str]:
-    """Top-level packages a file imports anywhere, inside functions and by name too."""
+    """Modules a file imports anywhere, inside functions and by name too."""
     names = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            names |= {alias.name.split(".")[0] for alias in node.names}
+            names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}: relative import, write it in full"
-            names.add((node.module or "").split(".")[0])
+            names |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
         elif isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", "")) == "import_module":
-            names |= {str(a.value).split(".")[0] for a in node.args if isinstance(a, ast.Constant)}
+            names |= {str(a.value) for a in node.args if isinstance(a, ast.Constant)}
     return names
 
 
@@ -35,8 +40,26 @@ def imported(path: Path) -> set[str]:
 def test_import_directions(package):
     files = sorted((ROOT / package).rglob("*.py"))
     assert files
-    wrong = {str(path.relative_to(ROOT)): imported(path) & FORBIDDEN[package] for path in files}
+    wrong = {
+        str(path.relative_to(ROOT)): {name.partition(".")[0] for name in imported(path)} & FORBIDDEN[package]
+        for path in files
+    }
     assert not {path: names for path, names in wrong.items() if names}
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_rooms_import_only_those_before_them(room):
+    place = ROOT / "coupling" / room
+    files = sorted(place.rglob("*.py")) or [place.with_suffix(".py")]
+    later = {f"coupling.{name}" for name in ROOMS[ROOMS.index(room) + 1 :]}
+    wrong = {path.name: later & {".".join(name.split(".")[:2]) for name in imported(path)} for path in files}
+    assert not {path: names for path, names in wrong.items() if names}
+
+
+def test_every_module_of_coupling_is_in_a_room():
+    found = (ROOT / "coupling").iterdir()
+    there = {path.stem for path in found if path.suffix == ".py" or (path / "__init__.py").exists()}
+    assert there - {"__init__"} == set(ROOMS)
 
 
 @pytest.mark.parametrize(
@@ -55,8 +78,3 @@ def test_light_imports_load_no_heavy_library(code):
     check = f"\nimport sys\nprint('HEAVY', *[name for name in {HEAVY!r} if name in sys.modules])"
     result = subprocess.run([sys.executable, "-c", code + check], capture_output=True, text=True, cwd=ROOT, check=True)
     assert result.stdout.splitlines()[-1].split() == ["HEAVY"]
-
-
-def test_run_stays_a_function_after_its_module_is_imported():
-    code = "import coupling, coupling.run; from coupling.run import run; assert coupling.run is run and callable(run)"
-    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)

@@ -5,9 +5,9 @@ import pytest
 
 import coupling
 import mpm
-from coupling.plan import features
-from coupling.recorded_simulation import MOST_UNBORNE
-from coupling.scene import scene_names
+from coupling.runs.recorded_simulation import MOST_UNBORNE
+from coupling.scenes.features import features
+from coupling.scenes.layers import scene_names
 from verification.small_event import small_scene
 
 QUICK = coupling.load_scene("quick").mpm

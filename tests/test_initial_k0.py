@@ -11,8 +11,9 @@ import pytest
 
 import coupling
 import mpm
-from coupling.plan import features, initial_k0, rough_plan
 from coupling.report.numbers import initial_theory
+from coupling.runs.plan import rough_plan
+from coupling.scenes.features import features, initial_k0
 from mpm.points import fill, initial_stress
 from mpm.variables import SXX, SXY, SYY, SZZ, VLY, VSX, P, Y
 from verification.small_event import COARSE, small_scene
@@ -183,7 +184,7 @@ def test_k0_of_the_base_is_left_out_again(tmp_path):
     assert coupling.load_scene(tmp_path / "given.toml").mpm.soils[0].k0 == 0.577
     scene = coupling.load_scene(tmp_path / "mine.toml")
     assert scene == coupling.load_scene("quick") and "k0" not in scene.source
-    assert coupling.scene.parse_scene(scene.source, "again") == scene
+    assert coupling.scenes.scene.parse_scene(scene.source, "again") == scene
 
 
 def test_k0_of_layers_is_that_of_each():

@@ -4,8 +4,9 @@ import h5py
 import numpy as np
 import pytest
 
-from coupling import datasets, journal
-from coupling.provenance import root_attributes
+from coupling import datasets
+from coupling.files import journal
+from coupling.files.provenance import root_attributes
 from verification.synthetic_run import make_quick_scene, record
 
 

@@ -8,8 +8,8 @@ import time as clock
 from typer.testing import CliRunner
 
 from coupling import cli
+from coupling.commands.describe import describe
 from coupling.datasets import RunFileError, read_attributes, read_history
-from coupling.info import describe
 from verification.small_event import small_scene
 
 

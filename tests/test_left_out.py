@@ -6,9 +6,9 @@ import pytest
 
 import coupling
 import coupling.datasets
-import coupling.plan
 import mpm
 import mpm.scene
+from coupling.scenes.features import features
 from mpm.contact import one_velocity_kernel, solve_nodes
 from mpm.variables import (
     B_D,
@@ -206,7 +206,7 @@ def test_undrained_scene_refuses_linings_that_move():
 
 def test_undrained_scene_has_one_velocity_in_the_plan():
     case = coupling.load_scene("quick", water={"drainage": "undrained"})
-    velocities = [f for f in coupling.plan.features(case, 1) if f["feature"].startswith("two velocities")]
+    velocities = [f for f in features(case, 1) if f["feature"].startswith("two velocities")]
     assert not velocities[0]["active"] and "undrained" in velocities[0]["reason"]
 
 

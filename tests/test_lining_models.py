@@ -12,7 +12,7 @@ from test_continuum_lining import pressures, ring
 
 import structure
 from coupling.datasets import read_response
-from coupling.run import run
+from coupling.runs.run import run
 from structure import models
 from verification.synthetic_run import make_quick_scene
 

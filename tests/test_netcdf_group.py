@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import coupling
-from coupling.netcdf_group import read_group_at_once
+from coupling.datasets.group import read_group_at_once
 from verification.synthetic_run import write_run
 
 

@@ -8,7 +8,7 @@ from report_study import write_study
 import coupling
 from coupling.datasets import cell_centres, read_pressures, read_response, write_response
 from coupling.report.page import write_report
-from coupling.run import respond_by_name
+from coupling.responses.respond import respond_by_name
 from structure import BeamSpringLining, ContinuumLining, theory
 from structure.lining import THETA, at_whole_degrees
 from verification.synthetic_run import write_run

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import coupling
-from coupling.run import respond
+from coupling.responses.respond import respond
 from verification.small_event import small_scene
 
 PAGE = (Path(__file__).parent.parent / "docs" / "postprocessing.md").read_text(encoding="utf-8")

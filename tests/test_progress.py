@@ -6,9 +6,9 @@ import pytest
 from test_cli import gush, simulated
 
 import coupling
-from coupling import progress_line
 from coupling.datasets import RunFileError, read_response
-from coupling.progress_line import ProgressLine
+from coupling.runs import progress_line
+from coupling.runs.progress_line import ProgressLine
 from verification.stability import command as stability_command
 
 assert simulated  # a fixture

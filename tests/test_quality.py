@@ -8,10 +8,18 @@ from test_cli import simulated  # noqa: F401
 from test_gushing import event, quick  # noqa: F401
 from test_heap import dropped_block
 
+from coupling.commands.describe import describe
 from coupling.datasets import read_attributes, read_history, read_response, write_attributes
-from coupling.info import describe
-from coupling.quality import ERRORS, poor_errors, quality, quality_attributes, quality_line, states_line, verdicts
-from coupling.run import run
+from coupling.postprocess.quality import (
+    ERRORS,
+    poor_errors,
+    quality,
+    quality_attributes,
+    quality_line,
+    states_line,
+    verdicts,
+)
+from coupling.runs.run import run
 from mpm import simulate
 from mpm.errors import COMPARED, errors, largest_so_far
 from mpm.scene import Numerics, Stop
@@ -126,6 +134,7 @@ def test_sand_that_is_not_pressed_together_is_at_the_tip_of_the_cone(event):  # 
     # a few per cent of the points, though more of the point-steps: points that flow are small and step often
     assert 0.001 < records[-1].tip_fraction < 0.2
     values = {"tip_fraction": 0.02, "clamps": {"tension": 0.14, "cavitated": 0.03, "porosity_floor": 0.0}}
+    assert states_line({"clamps": {}}) == "none"
     assert states_line(values) == (
         "tip of the Mohr-Coulomb cone 2.0% of points, 14.00% of point-steps; pores not full 3.00% of point-steps"
     )

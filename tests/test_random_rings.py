@@ -18,6 +18,7 @@ from verification.robustness.random_rings import (
     random_angles,
     random_balanced_loads,
     random_ring,
+    reason,
     sums,
 )
 
@@ -36,11 +37,11 @@ def cases():
 
 def test_random_ring_is_refused_only_where_a_joint_without_stiffness_gives_way():
     refused = [(ring, loads, answer) for ring, loads, answer in cases() if isinstance(answer, str)]
-    for ring, loads, reason in refused:
-        way = re.search(r"degrees\) (turns|slides|opens or closes) most freely", reason)[1]
-        assert getattr(ring, WAYS[way]) == 0, reason
+    for ring, loads, refusal in refused:
+        way = re.search(r"degrees\) (turns|slides|opens or closes) most freely", refusal)[1]
+        assert getattr(ring, WAYS[way]) == 0, refusal
         stiffer = ring.model_copy(update={name: max(getattr(ring, name), ORDINARY[name]) for name in WAYS.values()})
-        assert not isinstance(outcome(BeamSpringLining, stiffer, loads), str), reason
+        assert not isinstance(outcome(BeamSpringLining, stiffer, loads), str), refusal
     assert 0 < len(refused) < len(cases()) / 4
 
 
@@ -58,6 +59,22 @@ def test_random_ring_is_in_equilibrium_under_all_of_its_loads():
     # 1e-8 of the loads is asked for everywhere; what is taken out is the rounding of loads balanced to 1e-16.
     assert max(answer["equilibrium_residual"].item() for answer in solved) < 1e-8
     assert max(answer["unborne_resultant"].item() for answer in solved) < 1e-12
+
+
+def test_soft_joints_are_rightly_blamed_and_joints_of_a_crushed_ring_are_not():
+    ring = Ring(
+        **LINING, **ORDINARY, concrete_unit_weight=0.0, joint_angles=(10.0, 100.0, 200.0), ground=Ground(**SOIL),
+        balance_uplift=True,
+    )  # fmt: skip
+    degrees = np.arange(0.0, 360.0, 10.0)
+    even = loads_of(degrees, np.full(36, 3e5), np.zeros(36))
+    # each joint closes by N / k = 3e5 * 3.3 / 2e6 = 0.5 m
+    soft = ring.model_copy(update={"joint_normal_stiffness": 2e6})
+    for model, moves in ((BeamSpringLining, "opens or closes"), (ContinuumLining, "gives way")):
+        refusal = outcome(model, soft, even)
+        assert "beyond 0.33 m" in refusal and reason(model, soft, even, refusal) == (f"a soft joint {moves}", True)
+        refusal = outcome(model, ring, 1e5 * even)
+        assert "beyond 0.33 m" in refusal and not reason(model, ring, 1e5 * even, refusal)[1]
 
 
 def test_both_models_solve_and_refuse_the_same_random_rings():

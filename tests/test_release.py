@@ -5,7 +5,7 @@ import re
 import shutil
 import subprocess
 import tomllib
-from importlib.metadata import version
+from importlib.metadata import distribution, version
 from pathlib import Path
 
 import pytest
@@ -39,6 +39,26 @@ def test_citation_file_names_the_study_that_is_reproduced():
 
 def test_every_dependency_has_a_lower_bound():
     assert all(">=" in dependency for dependency in PROJECT["dependencies"])
+
+
+def test_what_runs_takes_less_than_700_megabytes():
+    """Installed files of the program and all that it depends on, without bytecode."""
+    requirements = pytest.importorskip("packaging.requirements")
+    sizes = {}
+
+    def add(name, extras=()):
+        found = distribution(name)
+        if found.name in sizes:
+            return
+        files = [Path(found.locate_file(file)) for file in found.files or ()]
+        sizes[found.name] = sum(file.stat().st_size for file in files if file.suffix != ".pyc" and file.is_file())
+        for each in map(requirements.Requirement, found.requires or ()):
+            if each.marker is None or any(each.marker.evaluate({"extra": extra}) for extra in ("", *extras)):
+                add(each.name, each.extras)
+
+    add(PROJECT["name"])
+    assert {"gmsh", "numba", "scipy", "xarray"} <= set(sizes) and "pytest" not in sizes
+    assert sum(sizes.values()) < 700e6, sorted(sizes.items(), key=lambda item: -item[1])[:5]
 
 
 def test_one_command_leaves_out_what_only_developers_need():

@@ -9,7 +9,7 @@ from page_in_browser import CONTRAST, choose, number, show_frame, spoken, wider_
 
 import coupling
 from coupling import datasets
-from coupling.provenance import root_attributes
+from coupling.files.provenance import root_attributes
 from coupling.report import page, series
 from verification.synthetic_run import record, write_run
 

@@ -16,10 +16,11 @@ import pytest
 from typer.testing import CliRunner
 
 import coupling
-from coupling import checkpoint, datasets, provenance
+from coupling import datasets
 from coupling.cli import app
-from coupling.rerun import compare_bits
-from coupling.run_folder import RunRefused
+from coupling.files import checkpoint, provenance
+from coupling.refused import Refused
+from coupling.runs.rerun import compare_bits
 from verification.small_event import small_scene
 
 OFTEN = {"checkpoint_interval": 0.0}  # the time that checkpoints may take is limited too: some ten of them
@@ -68,7 +69,7 @@ def in_child(work, prepare=lambda: None):
     if child == 0:
         code = 2
         try:
-            datasets.SECONDS_BETWEEN_WRITES = 0.0
+            datasets.writer.SECONDS_BETWEEN_WRITES = 0.0
             prepare()
             work()
             code = 0
@@ -129,7 +130,7 @@ def test_killed_again_and_again_it_still_ends_with_the_same_bits(scene, whole, t
 def test_killed_before_anything_was_written_it_is_started_again(scene, tmp_path):
     folder = tmp_path / "a"
     assert in_child(lambda: coupling.run(scene, folder), kill_at(1)) == KILLED
-    with pytest.raises(RunRefused, match="--overwrite"):
+    with pytest.raises(Refused, match="--overwrite"):
         coupling.run(out=folder, resume=True)
 
 
@@ -337,7 +338,7 @@ def test_what_cannot_be_resumed_is_refused_with_a_reason(whole, tmp_path):
     datasets.write_attributes(folder / "run.nc", status="failed", status_message="a point became non-finite")
     refused = gush("run", "--resume", "--out", folder)
     assert refused.exit_code == 2 and "a point became non-finite" in refused.output
-    with pytest.raises(RunRefused, match="scene"):
+    with pytest.raises(Refused, match="scene"):
         coupling.run(out=tmp_path / "b")
 
 

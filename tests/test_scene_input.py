@@ -8,8 +8,9 @@ from pydantic import ValidationError
 
 import coupling
 import structure
-from coupling import SceneError, ring_units
-from coupling.scene import parse_changes
+from coupling import SceneError
+from coupling.scenes import ring_units
+from coupling.scenes.layers import parse_changes
 from mpm.scene import Scene as MpmScene
 from structure.ring import Ground, Ring
 
@@ -373,7 +374,7 @@ def test_built_in_scene_begins_with_a_stress_that_its_soils_bear(name):
 def test_ring_without_ground_is_stored_as_such():
     scene = coupling.load_scene("quick", **{"ring.ground": "none"})
     assert scene.ring.ground is None and 'ground = "none"' in scene.source
-    assert coupling.scene.parse_scene(scene.source, "again") == scene == scene.changed(gravity=9.81)
+    assert coupling.scenes.scene.parse_scene(scene.source, "again") == scene == scene.changed(gravity=9.81)
     assert coupling.load_scene("quick", **{"ring.ground": None}) == scene
 
 

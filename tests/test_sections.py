@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import brentq
 
 from structure import InputError
-from structure.sections import (
+from structure.capacity import (
     SegmentSection,
     interaction,
     moment_utilisation,

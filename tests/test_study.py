@@ -14,14 +14,17 @@ import xarray as xr
 from test_cli import gush
 
 import coupling
+from coupling.commands.describe import describe
+from coupling.datasets import read_response
 from coupling.studies import case as case_module
 from coupling.studies import execute
 from coupling.studies.case import at_inflow_masses
+from coupling.studies.collect import units_of
 from coupling.studies.design import Study, StudyError, cases, load_study, study_names
 from coupling.studies.pool import Pool
 from coupling.studies.progress import CaseProgress, study_state
 from coupling.studies.sensitivity import scatter, sensitivity, tornado
-from verification.small_event import small_scene
+from verification.small_event import COARSE, small_scene
 
 K0 = 0.3 / (1 - 0.3)  # of gravity loading in the built-in scenes
 TINY = {
@@ -163,6 +166,39 @@ def test_impossible_study_is_refused_before_it_runs(change, message):
     assert message in str(refusal.value)
 
 
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"backends": "continuum"}, "backends: must be a list, got 'continuum'; correct it"),
+        ({"records": 2.5}, "records: must be a valid integer, got a number with a fractional part, got 2.5; correct"),
+        ({"parameters": {}}, "parameters: must have at least 1 entry"),
+        ({"parameters": {"gate": {"angle": [10.0]}}}, "gate: must be a list of values or a range; angle: unknown key"),
+        ({"design": "sobol", "samples": 4, "parameters": {"gate.width": {"low": "20 cm", "high": 0.15}}},
+         "gate.width: must be a list of values or a range; low must be below high, got 0.2 and 0.15; swap them"),
+        ({"desing": "list"}, "desing: unknown key, got 'list'; did you mean 'design'?"),
+    ],
+)  # fmt: skip
+def test_mistakes_of_a_study_are_told_in_words(change, message):
+    with pytest.raises(StudyError) as caught:
+        load_study(TINY | change)
+    assert message in str(caught.value) and "Input should" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"workers": -1}, "workers: must be a whole number from 0, got -1"),
+        ({"workers": "two"}, "workers: must be a whole number from 0, got 'two'"),
+        ({"out": 3}, "out: must be the path of a folder, got 3"),
+    ],
+)
+def test_study_refuses_arguments_of_a_wrong_type_before_it_starts(arguments, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(StudyError, match=message):
+        coupling.study(TINY, **arguments)
+    assert not list(tmp_path.iterdir())
+
+
 def test_failed_case_costs_only_itself_and_the_rest_is_not_run_again(fast, tmp_path, monkeypatch):
     lines = []
     data = coupling.study(TINY, tmp_path, workers=0, progress=lines.append)
@@ -205,6 +241,24 @@ def test_script_without_a_guard_runs_its_study_in_processes_and_in_silence(tmp_p
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.stderr == "" and done.returncode == 0
     assert done.stdout == "['finished', 'finished', 'finished'] ['angle 60', 'angle 90', 'angle 120']\n"
+
+
+def test_workers_load_what_a_case_needs_once_and_no_scheduler(tmp_path):
+    # six short cases take longer by two workers than in a loop where each worker loads libraries for itself
+    code = (
+        "import sys\nfrom importlib import import_module\nfrom coupling.studies.worker import LOADED\n"
+        "for name in LOADED:\n    import_module(name)\n"
+        "def heavy(): return {name.split('.')[0] for name in sys.modules} | {n for n in sys.modules if 'scipy.' in n}\n"
+        "before = heavy()\nfrom coupling.studies.case import run_case\n"
+        "run_case(sys.stdin.read(), sys.argv[1], ('beam-spring',), 2)\n"
+        "print(*{n for n in heavy() - before if n.count('.') < 2 and n.split('.')[-1][0] != '_'})\n"
+        "print('distributed' in sys.modules)"
+    )
+    scene = small_scene(stop={"inflow_mass": 1.0, "time": 0.01}).source
+    done = subprocess.run([sys.executable, "-W", "ignore", "-c", code, tmp_path], input=scene, capture_output=True,
+                          text=True, check=True)  # fmt: skip
+    loaded, scheduler = done.stdout.splitlines()
+    assert set(loaded.split()) <= {"threadpoolctl"} and scheduler == "False"
 
 
 def test_interrupted_study_leaves_no_process_behind(tmp_path):
@@ -267,7 +321,7 @@ def test_killed_case_is_continued_not_begun_anew(tmp_path, monkeypatch):
             raise Killed
 
     monkeypatch.setattr(CaseProgress, "__call__", report)
-    monkeypatch.setattr("coupling.recorded_simulation.RecordedSimulation._close_if_possible", lambda *a, **k: None)
+    monkeypatch.setattr("coupling.runs.recorded_simulation.RecordedSimulation._close_if_possible", lambda *a, **k: None)
     monkeypatch.setattr("mpm.simulation.SECONDS_BETWEEN_REPORTS", 0.0)
     with pytest.raises(Killed):
         case_module.run_case(scene.source, str(tmp_path / "killed"), (), 3)
@@ -279,6 +333,28 @@ def test_killed_case_is_continued_not_begun_anew(tmp_path, monkeypatch):
         for stamp in ("created", "history"):  # when each was made
             del one.attrs[stamp]
     xr.testing.assert_identical(*(one.drop_vars("cpu_seconds") for one in both))
+
+
+def test_study_that_was_stopped_says_so_and_goes_on_from_its_folder(fast, tmp_path, monkeypatch):
+    def stopped(*arguments):
+        if len(list((tmp_path / "out" / "cases").glob("*/case.nc"))) == 2:
+            raise KeyboardInterrupt
+        return made_up(*arguments)
+
+    monkeypatch.setattr(execute, "run_case", stopped)
+    with pytest.raises(KeyboardInterrupt) as stop:
+        coupling.study(TINY, tmp_path / "out", workers=0)
+    assert stop.value.__notes__ == [f"what is done is kept; go on with: gush study {tmp_path / 'out'}"]
+    found = describe(tmp_path / "out")
+    assert found["facts"]["finished"] == 2 and found["next"][0] == f"gush study {tmp_path / 'out'}"
+    monkeypatch.setattr(execute, "run_case", made_up)
+    shown = gush(*found["next"][0].split()[1:], "--workers", "0")
+    assert "4 cases, 2 of them are there already" in shown.output
+    whole = coupling.study(TINY, tmp_path / "whole", workers=0)
+    xr.testing.assert_identical(coupling.read_study(tmp_path / "out")["bending_moment"], whole["bending_moment"])
+    for empty in (tmp_path, tmp_path / "out" / "cases"):
+        with pytest.raises(StudyError, match=r"must hold study\.json, got none"):
+            load_study(empty)
 
 
 def test_command_runs_a_study_file(fast, tmp_path):
@@ -294,6 +370,32 @@ def test_command_runs_a_study_file(fast, tmp_path):
     assert result.exit_code == 2 and "did you mean 'permeability'" in result.output
     file.write_text("name = ")
     assert "must be valid TOML" in gush("study", file).output
+
+
+def test_table_of_a_study_shows_forces_by_what_its_cases_change(tmp_path):
+    file = tmp_path / "short.toml"
+    file.write_text(
+        'name = "short"\nrecords = 2\n[fixed]\n"stop.inflow_mass" = 1.0\n"stop.time" = 0.004\n'
+        '"output.interval" = 0.004\n"numerics.relaxation_tolerance" = 1e-3\n'
+        + "".join(f'"discretisation.{name}" = {value}\n' for name, value in COARSE.items())
+        + '[parameters]\n"gate.angle" = [60.0, 90.0]\n"soils.0.k0" = [0.5]\n'
+    )
+    result = gush("study", file, "--out", tmp_path / "out", "--workers", "2", "--json", tmp_path / "data.json")
+    assert result.exit_code == 0 and "Nanny" not in result.output and "arning" not in result.output, result.output
+    shown = gush("study", file, "--out", tmp_path / "out", "--workers", "2").output
+    data = json.loads((tmp_path / "data.json").read_text())
+    for case, angle in zip(data["cases"], (60, 90), strict=True):
+        assert case["name"] == f"angle {angle}, k0 0.5" and case["name"] in shown
+        response = read_response(tmp_path / "out" / "cases" / folder_of(tmp_path / "out", case["case"]) / "run")
+        moment, force = (response[name].isel(time=0) for name in ("bending_moment", "axial_force"))
+        assert case["bending_moment"] == {"max": float(moment.max()), "min": float(moment.min())}
+        assert case["axial_force"]["max"] == float(force.max())
+        assert f"{force.max() / 1e3:.0f}" in shown and f"{moment.min() / 1e3:.0f} to {moment.max() / 1e3:.0f}" in shown
+
+
+def folder_of(out, number):
+    """Key of a case by its number."""
+    return list(json.loads((out / "status.json").read_text()))[number]
 
 
 def test_case_is_taken_at_inflow_masses_and_unknown_beyond_them():
@@ -353,6 +455,25 @@ def test_sensitivity_ranks_parameters_by_their_effect():
         sensitivity(data, quantity.where(quantity.case < 2))
 
 
+def test_effects_of_a_sampled_linear_function_are_in_the_ratio_of_its_sobol_indices():
+    from scipy.stats import sobol_indices, uniform
+
+    factors = np.array([4.0, 2.0, 1.0])
+    n = 1024
+    indices = sobol_indices(func=lambda x: factors @ x, n=n, dists=[uniform()] * 3, rng=0).first_order
+    ranges = {name: {"low": 0.0, "high": 1.0} for name in "abc"}
+    shares = load_study({"name": "s", "design": "sobol", "samples": n, "parameters": ranges}).combinations()
+    coords = {name: ("case", np.array([row[name] for row in shares])) for name in ranges}
+    data = xr.Dataset(coords={"case": np.arange(n), **coords})
+    effects = sensitivity(
+        data, xr.DataArray(sum(f * data[k] for f, k in zip(factors, "abc", strict=True)), dims="case")
+    )
+    squares = effects["effect"].sel(parameter=[*"abc"]).values ** 2
+    # the indices of 16/21, 4/21, 1/21 by a thousand samples are known to some thousandths
+    np.testing.assert_allclose(squares / squares.sum(), indices, atol=0.01)
+    np.testing.assert_allclose(squares / squares.sum(), factors**2 / (factors**2).sum(), atol=2e-3)
+
+
 def one_at_a_time(parameters, quantity):
     """Dataset of such a study as `coupling.study` returns it: parameters by name to their values, the base first."""
     definition = {"name": "s", "design": "one-at-a-time", "parameters": {name: [0] for name in parameters}}
@@ -405,6 +526,7 @@ def test_parameters_with_units_are_numbers_of_the_dataset(fast, tmp_path):
     plan = TINY | {"parameters": {"gate.angle": ["1 rad", "60 deg"], "soils.0.k0": [0.5, 0.55]}}
     data = coupling.study(plan, tmp_path, workers=0)
     np.testing.assert_allclose(data["gate_angle"], np.degrees([1, 1, np.pi / 3, np.pi / 3]))
+    assert (data["gate_angle"].attrs["units"], data["soils_0_k0"].attrs["units"]) == ("degree", "1")
     moment = data["bending_moment"].isel(progress=-1)
     assert set(sensitivity(data, moment)["parameter"].values) == {"gate_angle", "soils_0_k0"}
     ranges = {"gate.width": {"low": "15 cm", "high": "0.2 m"}, "ring.concrete_modulus": {"low": "20 GPa", "high": 3e10}}
@@ -412,6 +534,15 @@ def test_parameters_with_units_are_numbers_of_the_dataset(fast, tmp_path):
     values = np.array([list(c.parameters.values()) for c in cases(sampled)])
     assert 0.15 <= values[:, 0].min() and values[:, 0].max() <= 0.2
     assert 2e10 <= values[:, 1].min() and values[:, 1].max() <= 3e10
+
+
+@pytest.mark.parametrize(
+    ("name", "units"),
+    [("gate.width", "m"), ("soils.0.grain_density", "kg/m^3"), ("stop.inflow_mass", "kg/m"), ("soils.0.porosity", "1"),
+     ("ring.joint_rotational_stiffness", "N m/rad/m"), ("ring.ground.cohesion", "Pa"), ("scene", "1")],
+)  # fmt: skip
+def test_units_of_a_parameter_are_those_of_its_key(name, units):
+    assert units_of(name) == units
 
 
 def test_effect_beside_a_k0_that_varies_with_depth_is_that_of_the_own_parameter():

@@ -10,12 +10,12 @@ from test_cli import gush
 
 import coupling
 from coupling.datasets import read_pressures, read_response
-from coupling.plausibility import warnings_of
+from coupling.postprocess.summary import summarise_run
 from coupling.report import run_page
 from coupling.report.page import write_report
-from coupling.run import respond, respond_by_name
-from coupling.scene import ring_of
-from coupling.summary import summarise_run
+from coupling.responses.respond import respond, respond_by_name
+from coupling.scenes.plausibility import warnings_of
+from coupling.scenes.rings import ring_of
 from verification.small_event import COARSE
 
 GATE = 1

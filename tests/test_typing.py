@@ -16,9 +16,11 @@ ROOT = Path(__file__).parent.parent
 PACKAGES = ("mpm", "structure", "coupling")
 #: Modules whose plain functions people call in scripts and notebooks.
 MODULES = (
-    "coupling.run", "coupling.datasets", "coupling.plan", "coupling.rerun", "coupling.export", "coupling.figures",
-    "coupling.summary", "coupling.progress_line", "coupling.quality", "coupling.info", "coupling.report.page",
-    "structure.theory", "structure.models", "structure.checks",
+    "coupling.runs.run", "coupling.runs.plan", "coupling.runs.memory", "coupling.runs.rerun",
+    "coupling.runs.progress_line", "coupling.responses.respond", "coupling.scenes.features", "coupling.scenes.rings",
+    "coupling.datasets.reader", "coupling.datasets.additions", "coupling.datasets.theta_grid", "coupling.export",
+    "coupling.export.grids", "coupling.figures.ground", "coupling.figures.ring", "coupling.figures.history",
+    "coupling.figures.of_run", "coupling.report.page", "structure.theory", "structure.models", "structure.checks",
     *(f"coupling.postprocess.{module.name}" for module in pkgutil.iter_modules(coupling.postprocess.__path__)),
 )  # fmt: skip
 SCRIPT = """

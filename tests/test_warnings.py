@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 import coupling
 import structure
 from coupling import GushingWarning, cli
-from coupling.plan import plan, rough_plan
+from coupling.runs.plan import plan, rough_plan
 from verification.small_event import small_scene
 
 UNUSUAL = {"ring": {"ground": {"youngs_modulus": 35.0, "friction_angle": 0.5}}}

@@ -36,7 +36,7 @@ def test_sign_of_a_diameter_and_of_a_joint_is_told_where_it_is_shown(run, page):
         assert "(+) or" in shown[key].label and "(−)" in shown[key].label
     assert "shortens by" not in page
     response = CliRunner().invoke(app, ["respond", str(run)])
-    assert "opening (+) or" in response.output and "closing (-)" in response.output
+    assert "opening (+) or" in response.output and "closing (−)" in response.output
 
 
 def test_difference_of_two_models_is_not_called_an_error(run):

@@ -6,8 +6,8 @@ from typer.testing import CliRunner
 import coupling
 import structure
 from coupling import cli
-from coupling.plan import rough_plan
-from coupling.run_folder import RunRefused
+from coupling.refused import Refused
+from coupling.runs.plan import rough_plan
 from verification.small_event import small_scene
 
 
@@ -32,7 +32,7 @@ def test_run_says_what_a_scene_is(scene, parts, tmp_path):
 def test_run_takes_the_name_of_a_scene():
     # planned alike, and refused only for what comes after the scene
     assert rough_plan("quick") == rough_plan(coupling.load_scene("quick"))
-    with pytest.raises(RunRefused, match="is a file"):
+    with pytest.raises(Refused, match="is a file"):
         coupling.run("quick", __file__)
 
 
@@ -51,7 +51,7 @@ def test_run_takes_the_name_of_a_scene():
 )
 def test_run_refuses_arguments_of_a_wrong_type_before_it_starts(arguments, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(RunRefused, match=message):
+    with pytest.raises(Refused, match=message):
         coupling.run("quick", **arguments)
     assert not list(tmp_path.iterdir())
 
@@ -61,6 +61,26 @@ def test_solver_refuses_what_is_no_number_of_threads():
 
     with pytest.raises(ValueError, match="threads: must be a whole number from 1, got 0"):
         mpm.Solver(None, None, threads=0)
+
+
+def test_ground_alone_says_which_scene_it_takes():
+    import mpm
+
+    whole = coupling.load_scene("quick")
+    for given, hint in ((whole, "got a Scene; give its .mpm"), ("quick", r"got a str; coupling.load_scene\('quick'\)")):
+        for use in (mpm.build_mesh, lambda scene: mpm.Solver(scene, None), lambda scene: next(mpm.simulate(scene))):
+            with pytest.raises(ValueError, match=f"scene: must be an mpm.Scene, {hint}"):
+                use(given)
+
+
+@pytest.mark.parametrize("model", [structure.BeamSpringLining, structure.ContinuumLining])
+def test_lining_models_say_what_they_take(model):
+    scene = coupling.load_scene("quick")
+    for given, hint in ((scene, "got a Scene; give its .ring"), (None, "got a NoneType; make one")):
+        with pytest.raises(structure.InputError, match=rf"ring: must be a structure\.Ring, {hint}"):
+            model(given)
+    with pytest.raises(ValueError, match=r"pressures: must be an xarray\.Dataset of soil_pressure.*, got a list"):
+        model(scene.ring).respond([1e5, 1e5])
 
 
 @pytest.mark.parametrize(

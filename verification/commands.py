@@ -7,8 +7,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from coupling.exit_codes import FAILED, JsonPath, checked_json, complain, failures, write_json
-from coupling.progress_line import ProgressLine
+from coupling.commands.exit_codes import FAILED, JsonPath, checked_json, complain, failures, write_json
+from coupling.runs.progress_line import ProgressLine
 
 PUBLISHED_RUNS = Path("studies/published")
 
@@ -58,7 +58,7 @@ def bench_command(
     if step and out is not None:
         raise typer.BadParameter("--step measures too little for a page; leave out --step or --out")
     with failures(), checked_json(json_path):
-        from coupling.scene import load_scene
+        from coupling.scenes.scene import load_scene
         from verification.speed.command import bench
         from verification.speed.report import write
 
@@ -139,7 +139,7 @@ def published_command(
 ):
     """The published study, whole: Table 2, twin tunnels, mirror image, sensitivity; page and figures. Rerun to resume.
 
-    JSON: keys of `verification.published.page.write_page`, and `studies`: keys of `coupling.studies.command.run_study`.
+    JSON: keys of `verification.published.page.write_page`, and `studies`: keys of `coupling.studies.stored.run_study`.
     """
     with failures(), checked_json(json_path):
         from verification.published.page import write_page

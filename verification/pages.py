@@ -6,7 +6,7 @@ import sys
 from datetime import UTC, datetime
 from pathlib import Path
 
-from coupling.provenance import revision
+from coupling.files.provenance import revision
 
 #: Docs of the working copy this code runs from; an installed program has none.
 DOCS = Path(__file__).resolve().parent.parent / "docs"

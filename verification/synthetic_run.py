@@ -8,8 +8,8 @@ import numpy as np
 import coupling
 from coupling import datasets
 from coupling.datasets import BALANCES, ERRORS
-from coupling.provenance import root_attributes
-from coupling.run import respond
+from coupling.files.provenance import root_attributes
+from coupling.responses.respond import respond
 from mpm.simulation import Record
 from mpm.variables import CLAMPS, POINT_VARIABLES
 

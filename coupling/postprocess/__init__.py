@@ -4,6 +4,7 @@ States at equal inflow mass and their ratios to the initial state, extremes, the
 the axes through the gate, the settlement trough, fields on the mesh, the heap inside. Examples: docs/postprocessing.md.
 """
 
+from coupling.datasets.geometry import gate_diameter, gate_position, tunnels
 from coupling.postprocess.elements import (
     element_areas,
     element_centres,
@@ -13,7 +14,7 @@ from coupling.postprocess.elements import (
 )
 from coupling.postprocess.extremes import extremes
 from coupling.postprocess.fields import element_fields
-from coupling.postprocess.geometry import gate_diameter, gate_position, tunnels
+from coupling.postprocess.flow_zone import Stages, flow_zone_stages
 from coupling.postprocess.ground_axes import arch, influence_distance, profile, stress_variation
 from coupling.postprocess.heap import filled, heap
 from coupling.postprocess.inflow import (
@@ -26,7 +27,6 @@ from coupling.postprocess.inflow import (
     with_inflow,
 )
 from coupling.postprocess.settlement import share_within, surface_settlement, trough
-from coupling.postprocess.stages import Stages, flow_zone_stages
 
 __all__ = [
     "Stages",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coupling.postprocess.geometry import gate_position
+from coupling.datasets.geometry import gate_position
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,16 +31,22 @@ def element_means(
     volume : (n_elements,) float64
         Volume of the material in the element [m2].
     """
-    element = element_of_points(points, mesh)
+    element, count = element_of_points(points, mesh), mesh.sizes["element"]
     values = points[name].values if isinstance(name, str) else name
-    inside = element >= 0
-    count = mesh.sizes["element"]
-    weight = points["volume"].values[inside]
-    volume = np.bincount(element[inside], weight, count)
-    with np.errstate(invalid="ignore"):
-        return np.bincount(element[inside], weight * values[inside], count) / np.where(
-            volume > 0, volume, np.nan
-        ), volume
+    inside, weight = element >= 0, points["volume"].values
+    volume = np.bincount(element[inside], weight[inside], count)
+    return cell_means(element, weight, values, count), volume
+
+
+def cell_means(
+    cell: NDArray[np.integer], weight: NDArray[np.floating], values: NDArray[np.floating], count: int
+) -> NDArray[np.float64]:
+    """Weighted means of values by their cells, from 0 to `count` - 1; NaN in empty ones. Other cells do not count."""
+    inside = (cell >= 0) & (cell < count)
+    cell, weight = cell[inside], weight[inside].astype(float)
+    total = np.bincount(cell, weight, count)
+    summed = np.bincount(cell, weight * values[inside], count)
+    return np.where(total > 0, summed / np.where(total > 0, total, 1.0), np.nan)
 
 
 def element_of_points(points: xr.Dataset, mesh: xr.Dataset) -> NDArray[np.int64]:

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from structure.response import FORCES, SHOWN
+
 if TYPE_CHECKING:
     import xarray as xr
+    from numpy.typing import NDArray
 
 
-def extremes(
-    dataset: xr.Dataset, names: Sequence[str] = ("axial_force", "shear_force", "bending_moment"), along: str = "theta"
-) -> xr.Dataset:
+def extremes(dataset: xr.Dataset, names: Sequence[str] = FORCES, along: str = "theta") -> xr.Dataset:
     """Largest and smallest value of each quantity around the ring, with the angles where they are.
 
     Parameters
@@ -37,17 +38,56 @@ def extremes(
     for name in names:
         if along not in dataset[name].dims:
             raise ValueError(f"extremes: {name} must have the dimension {along}, got {dataset[name].dims}")
-        values, about = dataset[name], dataset[name].attrs
-        known = values.notnull().all(along)
-        for kind, pick in (("max", "largest"), ("min", "smallest")):
-            extreme = getattr(values, kind)(along)
-            place = getattr(values.fillna(-np.inf if kind == "max" else np.inf), f"arg{kind}")(along)
-            angle = values[along].isel({along: place}).drop_vars(along)
+        about, dims = dataset[name].attrs, [dim for dim in dataset[name].dims if dim != along]
+        values, places = dataset[name].transpose(*dims, along).values, dataset[along].values
+        known = ~np.isnan(values)
+        for kind, pick, sign in (("max", "largest", 1.0), ("min", "smallest", -1.0)):
+            at = np.argmax(np.where(known, sign * values, -np.inf), axis=-1)
             text = f"{pick} {about.get('long_name', name)}"
-            result[f"{name}_{kind}"] = extreme.assign_attrs(units=about.get("units", "1"), long_name=text)
-            result[f"{name}_{kind}_angle"] = angle.where(known).assign_attrs(
-                units=dataset[along].attrs.get("units", "degree"), long_name=f"where the {text} is"
+            result[f"{name}_{kind}"] = (
+                dims,
+                np.take_along_axis(values, at[..., None], axis=-1)[..., 0],
+                {"units": about.get("units", "1"), "long_name": text},
             )
+            result[f"{name}_{kind}_angle"] = (
+                dims,
+                np.where(known.any(axis=-1), places[at], np.nan),
+                {"units": dataset[along].attrs.get("units", "degree"), "long_name": f"where the {text} is"},
+            )
+    result = result.assign_coords({name: c for name, c in dataset.coords.items() if along not in c.dims})
     if "inflow_mass" in dataset:
         result["inflow_mass"] = dataset["inflow_mass"]
     return result
+
+
+#: Extremes of a ring that are told: NAME_max and NAME_min around it, of its joints, and what has one value.
+RING_EXTREMES = (
+    *(f"{name}_{kind}" for name in FORCES for kind in ("max", "min")),
+    "joint_opening_max", "joint_rotation_max", "convergence_horizontal", "convergence_vertical",
+)  # fmt: skip
+
+
+def ring_extremes(response: xr.Dataset) -> dict[str, NDArray[np.float64]]:
+    """Extremes of a response over its records: keys of `RING_EXTREMES` as far as it has them, and KEY_angle of forces.
+
+    The largest rotation is that by size.
+
+    Parameters
+    ----------
+    response : xarray.Dataset
+        Over time or another dimension.
+    """
+    found = {key: values.values for key, values in extremes(response).data_vars.items() if key != "inflow_mass"}
+    if response.sizes.get("joint"):
+        found["joint_opening_max"] = response["joint_opening"].max("joint").values
+        found["joint_rotation_max"] = abs(response["joint_rotation"]).max("joint").values
+    return found | {key: response[key].values for key in RING_EXTREMES if key in response}
+
+
+def shown_extreme(key: str) -> tuple[str, str, float]:
+    """How people are shown one of `RING_EXTREMES`: label, unit, factor to it."""
+    if key in SHOWN:
+        return SHOWN[key].name, SHOWN[key].unit, SHOWN[key].scale
+    name, _, kind = key.rpartition("_")
+    pick = "largest size" if name == "joint_rotation" else {"max": "largest", "min": "smallest"}[kind]
+    return f"{SHOWN[name].name}, {pick}", SHOWN[name].unit, SHOWN[name].scale

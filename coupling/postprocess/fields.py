@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coupling.postprocess.elements import element_centres, element_of_points
+from coupling.postprocess.elements import cell_means, element_centres, element_of_points
 from coupling.postprocess.ground_axes import QUANTITIES, point_quantities
 
 if TYPE_CHECKING:
@@ -41,14 +41,10 @@ def element_fields(points: xr.Dataset, mesh: xr.Dataset) -> xr.Dataset:
     count = mesh.sizes["element"]
     for k in range(points.sizes["time"]):
         now = points.isel(time=k)
-        element = element_of_points(now, mesh)
-        inside = element >= 0
-        weight = now["volume"].values[inside]
-        total = np.bincount(element[inside], weight, count)
+        element, weight = element_of_points(now, mesh), now["volume"].values
         fields = {**point_quantities(now), "deviatoric_strain": now["deviatoric_strain"].values}
         for name, values in fields.items():
-            summed = np.bincount(element[inside], weight * values[inside], count)
-            rows[name].append(np.where(total > 0, summed / np.where(total > 0, total, 1.0), np.nan))
+            rows[name].append(cell_means(element, weight, values, count))
     centre = element_centres(mesh)
     return xr.Dataset(
         {

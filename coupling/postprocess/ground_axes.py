@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coupling.postprocess.geometry import gate_diameter, gate_position, tunnels
+from coupling.datasets.geometry import gate_diameter, gate_of, gate_position, tunnel_list
+from coupling.postprocess.elements import cell_means
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,7 +62,7 @@ def profile(points: xr.Dataset, direction: str, spacing: float = 0.5, half_width
         raise ValueError(f"profile: direction must be 'horizontal' or 'vertical', got {direction!r}")
     if "time" not in points.dims:
         points = points.expand_dims("time")
-    gate, openings = gate_position(points), tunnels(points)
+    gate = gate_position(points)
     reach = float(np.nanmax(np.abs(points["x" if direction == "horizontal" else "y"].values))) + 20.0
     count = int(np.ceil(reach / spacing))
     edges = spacing * (np.arange(-count, count + 1) - 0.5)
@@ -70,17 +71,13 @@ def profile(points: xr.Dataset, direction: str, spacing: float = 0.5, half_width
         now = points.isel(time=k)
         x, y, volume = now["x"].values, now["y"].values, now["volume"].values
         ground = np.isfinite(x)
-        for cx, cy, outer, _ in openings:
-            ground &= np.hypot(x - cx, y - cy) > outer
+        for tunnel in tunnel_list(points):
+            ground &= tunnel.distance(x, y) > tunnel.outer
         along, across = (x - gate[0], y - gate[1]) if direction == "horizontal" else (y - gate[1], x - gate[0])
         ground &= np.abs(across) <= half_width
-        cell = np.digitize(along[ground], edges) - 1
-        inside = (cell >= 0) & (cell < len(edges) - 1)
-        cell, weight = cell[inside], volume[ground][inside]
-        total = np.bincount(cell, weight, len(edges) - 1)
+        cell = np.where(ground, np.digitize(along, edges) - 1, -1)
         for name, values in point_quantities(now).items():
-            summed = np.bincount(cell, weight * values[ground][inside], len(edges) - 1)
-            rows[name].append(np.where(total > 0, summed / np.where(total > 0, total, 1.0), np.nan))
+            rows[name].append(cell_means(cell, volume, values, len(edges) - 1))
     return xr.Dataset(
         {
             name: (("time", "distance"), np.array(rows[name]), {"units": units, "long_name": text})
@@ -180,7 +177,7 @@ def arch(axis: xr.Dataset, name: str = "soil_stress_vertical", window: float = 1
 
 def _on_ground_side(values, axis):
     """Values on the side of the gate away from its lining, on both sides where the axis only touches it."""
-    angle = np.radians(float(axis.attrs["gate_angle"]))
+    angle = np.radians(gate_of(axis).angle)
     outward = np.sin(angle) if axis.attrs["direction"] == "horizontal" else np.cos(angle)
     if abs(outward) < 0.1:
         return values

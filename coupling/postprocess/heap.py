@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from coupling.datasets.geometry import tunnel_of
 from coupling.postprocess.elements import element_areas, element_of_points
 
 if TYPE_CHECKING:
@@ -26,12 +27,8 @@ def heap(points: xr.Dataset, mesh: xr.Dataset) -> dict[str, float]:
         tunnel [kg/m]; resting_share: of this mass, what moves slower than 0.5 m/s [-]; speed: median by mass of all
         grains inside [m/s].
     """
-    tunnel = int(mesh.attrs["gate_tunnel"])
-    x0, depth, radius = (
-        float(np.atleast_1d(mesh.attrs[name])[tunnel])
-        for name in ("tunnel_x", "tunnel_axis_depth", "tunnel_inner_radius")
-    )
-    inside = np.hypot(points["x"].values - x0, points["y"].values + depth) < radius
+    tunnel = tunnel_of(mesh)
+    inside = tunnel.distance(points["x"].values, points["y"].values) < tunnel.inner
     speed = np.hypot(points["velocity_solid_x"].values, points["velocity_solid_y"].values)
     mass, volume = points["grain_mass"].values, points["volume"].values
     element = element_of_points(points, mesh)

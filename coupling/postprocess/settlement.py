@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from coupling.postprocess.elements import cell_means
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -51,8 +53,7 @@ def surface_settlement(points: xr.Dataset, spacing: float = 1.0, depth: float = 
         x = x_start[k, near[k]]
         weight, down = points["volume"].values[k, near[k]], -points["displacement_y"].values[k, near[k]]
         cell = np.clip(np.digitize(x, edges) - 1, 0, len(edges) - 2)
-        total, summed = np.bincount(cell, weight, len(edges) - 1), np.bincount(cell, weight * down, len(edges) - 1)
-        rows.append(np.where(total > 0, summed / np.where(total > 0, total, 1.0), np.nan))
+        rows.append(cell_means(cell, weight, down, len(edges) - 1))
     return xr.DataArray(
         np.array(rows),
         dims=("time", "x"),

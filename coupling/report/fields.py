@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from coupling.datasets.geometry import Tunnel, has_tunnels, tunnel_of
 from coupling.report.packing import BASE64, evenly, packed, quantised
 
 BYTES_OF_FIELDS = 4.2e6  # base64 text of all snapshots
@@ -81,12 +82,9 @@ def field_snapshots(points, budget=BYTES_OF_FIELDS):
 
 
 def _view(points):
-    attrs = points.attrs
-    if "tunnel_x" in attrs:
-        k = int(attrs.get("gate_tunnel", 0))
-        radius = float(np.atleast_1d(attrs["tunnel_outer_radius"])[k])
-        x, y = np.atleast_1d(attrs["tunnel_x"])[k], -np.atleast_1d(attrs["tunnel_axis_depth"])[k]
-        return {"x": float(x), "y": float(y), "half": VIEW_RADII * radius}
+    if has_tunnels(points):
+        tunnel = tunnel_of(points)
+        return {"x": tunnel.x, "y": tunnel.y, "half": VIEW_RADII * tunnel.outer}
     extent = [(float(points[name].min()), float(points[name].max())) for name in ("x", "y")]
     middle = [0.5 * (low + high) for low, high in extent]
     return {"x": middle[0], "y": middle[1], "half": max(0.52 * (high - low) for low, high in extent) or 1.0}
@@ -194,8 +192,6 @@ def triangle_quality(x, y, corners):
 
 
 def _nearest_elements(mesh, corners):
-    k = int(mesh.attrs.get("gate_tunnel", 0))
-    x = np.atleast_1d(mesh.attrs.get("tunnel_x", 0.0))[k]
-    depth = np.atleast_1d(mesh.attrs.get("tunnel_axis_depth", 0.0))[k]
-    middle_x, middle_y = mesh["x"].values[corners].mean(axis=1), mesh["y"].values[corners].mean(axis=1)
-    return np.sort(np.argsort(np.hypot(middle_x - x, middle_y + depth), kind="stable")[:MOST_ELEMENTS])
+    tunnel = tunnel_of(mesh) if has_tunnels(mesh) else Tunnel(0.0, 0.0, 0.0, 0.0)
+    distance = tunnel.distance(mesh["x"].values[corners].mean(axis=1), mesh["y"].values[corners].mean(axis=1))
+    return np.sort(np.argsort(distance, kind="stable")[:MOST_ELEMENTS])

@@ -96,13 +96,6 @@ def header(title, lead, status, warned, notes):
 </header>"""
 
 
-def duration(seconds):
-    """A time that was waited for, as text."""
-    return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min" if seconds < 7200 else (
-        f"{seconds / 3600:.1f} h"
-    )  # fmt: skip
-
-
 def figure(key, title, unit, kind, extra=""):
     """Place of a chart that the script draws: kind "svg" or "canvas", `extra` HTML above it."""
     unit_text = f' <span class="unit">[{escape(unit)}]</span>' if unit else ""

@@ -5,9 +5,11 @@ from typing import NamedTuple
 import numpy as np
 
 from coupling.datasets import HISTORY, structure_group
-from coupling.quality import ERRORS, STATES
-from coupling.report.series import match_times, model_names, tunnels_beside
-from coupling.summary import PLACES
+from coupling.datasets.geometry import gate_of, has_tunnels, on_tunnel, tunnel_of, tunnels_beside
+from coupling.datasets.tree import match_times, model_names
+from coupling.postprocess.extremes import RING_EXTREMES, ring_extremes, shown_extreme
+from coupling.postprocess.quality import ERRORS, STATES
+from coupling.postprocess.summary import PLACES
 from mpm.variables import CLAMPS
 
 #: What it means that points meet a limit, by its name in :data:`mpm.variables.CLAMPS`.
@@ -19,24 +21,8 @@ MEANINGS = {
     "porosity_ceiling": "held there; no sound run reaches it",
     "returned_to_mesh": "they would have left the mesh within a step",
 }
-
-#: Variable and which extreme of it: (label, unit shown, factor from SI).
-RING_EXTREMES = {
-    "axial_force_max": ("axial force N, largest", "kN/m", 1e-3),
-    "axial_force_min": ("axial force N, smallest", "kN/m", 1e-3),
-    "shear_force_max": ("shear force Q, largest", "kN/m", 1e-3),
-    "shear_force_min": ("shear force Q, smallest", "kN/m", 1e-3),
-    "bending_moment_max": ("bending moment M, largest", "kN m/m", 1e-3),
-    "bending_moment_min": ("bending moment M, smallest", "kN m/m", 1e-3),
-    "joint_opening_max": ("joint opening (+) or closing (−), largest", "mm", 1e3),
-    "joint_rotation_max": ("joint rotation, largest size", "mrad", 1e3),
-    "convergence_horizontal": ("horizontal diameter shorter (+) or longer (−)", "mm", 1e3),
-    "convergence_vertical": ("vertical diameter shorter (+) or longer (−)", "mm", 1e3),
-}
 SHEAR_LIMIT = 0.05  # of the largest Q; the slope of M is taken over one element
 THEORY_LIMIT = 0.02  # of the mean pressure; an element at the lining sees the depth of its middle
-
-
 DIFFERENCE = "difference from"
 
 
@@ -76,7 +62,7 @@ def key_numbers(run):
         Title of a group to its list of Number; groups without numbers are left out.
     """
     groups = {"Gushing": _inflow_numbers(run)}
-    for tunnel in (None, *tunnels_beside(run)):
+    for tunnel in (None, *tunnels_beside(run["lining"])):
         of = "" if tunnel is None else f" of tunnel {tunnel}"
         groups[f"Pressures on the lining{of}"] = _pressure_numbers(run["lining"].to_dataset(), tunnel)
         title = ", ".join([f"Forces and deformation of the ring{of}", *model_names(run, tunnel)[:1]])
@@ -107,12 +93,10 @@ def _inflow_numbers(run):
 def _mass_of_a_point_inside(run):
     """Largest grain mass of a point inside the gate's tunnel at the last snapshot [kg/m]: inflow is counted in them."""
     points = run["points"].to_dataset() if "points" in run.children else None
-    if points is None or "grain_mass" not in points or not points.sizes["time"] or "tunnel_x" not in points.attrs:
+    if points is None or "grain_mass" not in points or not points.sizes["time"] or not has_tunnels(points):
         return 0.0
-    attrs, k = points.attrs, int(points.attrs.get("gate_tunnel", 0))
-    x, depth, inner = (np.atleast_1d(attrs[f"tunnel_{n}"])[k] for n in ("x", "axis_depth", "inner_radius"))
-    last = points.isel(time=-1)
-    inside = np.hypot(last["x"].values - x, last["y"].values + depth) < inner
+    last, tunnel = points.isel(time=-1), tunnel_of(points)
+    inside = tunnel.distance(last["x"].values, last["y"].values) < tunnel.inner
     return float(np.nanmax(last["grain_mass"].values[inside])) if inside.any() else 0.0
 
 
@@ -154,13 +138,12 @@ def scatter(values, spread):
 def _pressure_numbers(lining, tunnel):
     if "soil_pressure" not in lining:
         return []
-    if "tunnel" in lining.dims:
-        lining = lining.isel(tunnel=int(lining.attrs.get("gate_tunnel", 0)) if tunnel is None else tunnel)
+    lining = on_tunnel(lining, tunnel)
     numbers, key = [], "" if tunnel is None else f"tunnel_{tunnel}_"
     for name, label in (("soil_pressure", "soil"), ("water_pressure", "water")):
         for place, theta in PLACES.items():
             series, spread = lining[name].sel(theta=theta).values, lining[f"{name}_std"].sel(theta=theta).values
-            open_here = tunnel is None and len(series) > 1 and _in_gate(lining.attrs, theta)
+            open_here = tunnel is None and len(series) > 1 and _in_gate(lining, theta)
             numbers.append(
                 Number(
                     f"{key}{name}_{theta}", f"{label}, {place}{' (the gate)' if open_here else ''}", "kPa", 1e-3,
@@ -171,13 +154,13 @@ def _pressure_numbers(lining, tunnel):
     return numbers
 
 
-def _in_gate(geometry, theta):
+def _in_gate(lining, theta):
     """Whether an angle [degree] lies in the gate, where the open lining carries no pressure."""
-    if "gate_angle" not in geometry:
+    gate = gate_of(lining)
+    if gate is None:
         return False
-    outer = float(np.atleast_1d(geometry["tunnel_outer_radius"])[int(geometry["gate_tunnel"])])
-    half = np.degrees(np.arcsin(min(1.0, 0.5 * float(geometry["gate_width"]) / outer)))
-    return abs((theta - float(geometry["gate_angle"]) + 180) % 360 - 180) <= half
+    half = np.degrees(np.arcsin(min(1.0, 0.5 * gate.width / tunnel_of(lining).outer)))
+    return abs((theta - gate.angle + 180) % 360 - 180) <= half
 
 
 def initial_theory(scene, theta):
@@ -215,19 +198,6 @@ def ground_slips(scene):
     return scene.mpm.bond_friction(tunnel) > tunnel.friction_coefficient
 
 
-def ring_extremes(response, record):
-    """Extreme forces and joint deformations of one record: key of `RING_EXTREMES` to SI value."""
-    state, values = response.isel(time=record), {}
-    for key in RING_EXTREMES:
-        name, _, extreme = key.rpartition("_")
-        if key in state:
-            values[key] = float(state[key])
-        elif name in state and state[name].size:
-            found = np.abs(state[name].values) if name == "joint_rotation" else state[name].values
-            values[key] = float(np.nanmax(found) if extreme == "max" else np.nanmin(found))
-    return values
-
-
 def _ring_numbers(run, tunnel):
     models = model_names(run, tunnel)
     if not models:
@@ -236,18 +206,19 @@ def _ring_numbers(run, tunnel):
     first = responses[models[0]]
     if not first.sizes["time"]:
         return []
-    start, end = ring_extremes(first, 0), ring_extremes(first, -1)
+    found = ring_extremes(first)
+    start, end = ({key: float(values[row]) for key, values in found.items()} for row in (0, -1))
     others = []
     for name in models[1:]:
         rows, present = match_times(responses[name]["time"].values, first["time"].values[-1:])
         if present[0]:
-            others.append(ring_extremes(responses[name], int(rows[0])))
+            others.append({key: float(v[rows[0]]) for key, v in ring_extremes(responses[name]).items()})
     labels = ", ".join(models[1:]) if others else "another lining model: there is none"
     basis = f"{DIFFERENCE} {labels}"
     return [
-        Number(key if tunnel is None else f"tunnel_{tunnel}_{key}", label, unit, scale, start[key], end[key],
+        Number(key if tunnel is None else f"tunnel_{tunnel}_{key}", *shown_extreme(key), start[key], end[key],
                max((abs(other[key] - end[key]) for other in others if key in other), default=None), basis)
-        for key, (label, unit, scale) in RING_EXTREMES.items() if key in end
+        for key in RING_EXTREMES if key in end
     ]  # fmt: skip
 
 
@@ -258,21 +229,21 @@ def quality(run, summary, scene=None):
     ----------
     run : xarray.DataTree
     summary : dict
-        From :func:`coupling.summary.summarise_run`.
+        From :func:`coupling.postprocess.summary.summarise_run`.
     scene : coupling.Scene or None
         For the theory of the initial pressures.
 
     Returns
     -------
     list of (str, str, str, bool or None)
-        What, how much, and its verdict: a word of :data:`coupling.quality.ERRORS`, or whether it is within what is
-        expected; None where nothing is expected of it.
+        What, how much, and its verdict: a word of :data:`coupling.postprocess.quality.ERRORS`, or whether it is within
+        what is expected; None where nothing is expected of it.
     """
     values = summary["quality"]
     rows = [(ERRORS[name].label, ERRORS[name].text(values[name]), verdict)
             for name, verdict in summary["verdicts"].items()]  # fmt: skip
     rows += _against_theory(run["lining"].to_dataset(), scene)
-    answers = [(model, k) for k in (None, *tunnels_beside(run)) for model in model_names(run, k)]
+    answers = [(model, k) for k in (None, *tunnels_beside(run["lining"])) for model in model_names(run, k)]
     for model, tunnel in answers:
         response = run[structure_group(model, tunnel)].to_dataset()
         name = model if tunnel is None else f"{model}, tunnel {tunnel}"
@@ -331,7 +302,7 @@ def warnings(run, attributes, quality_rows):
     models = model_names(run)
     if "soil_pressure" in lining and not models:
         found.append("No lining model has answered to the pressures: run `gush respond` on this run.")
-    for tunnel in tunnels_beside(run) if models else ():
+    for tunnel in tunnels_beside(run["lining"]) if models else ():
         if not model_names(run, tunnel):
             found.append(f"No lining model has answered for tunnel {tunnel}: run `gush respond` on this run.")
     for name in models:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-import os
-import tempfile
 from importlib import resources
 from pathlib import Path
 
 from coupling.datasets import run_file
+from coupling.files.folder import REPORT_FILE, RUN_FILE
+from coupling.files.replace import replace_file
+from coupling.refused import Refused
 from coupling.report.frame import document
-from coupling.run_folder import REPORT_FILE, RUN_FILE, RunRefused
+from structure.response import SHOWN
 
+QUANTITIES = {name: (shown.unit, shown.scale) for name, shown in SHOWN.items()}
 MARK = '<meta name="generator" content="gushing report">'
 
 
@@ -37,7 +39,7 @@ def write_report(path: str | Path, out: str | Path | None = None, model: str | N
     ------
     RunFileError
         No run, or one without a record.
-    RunRefused
+    Refused
         Neither a run nor a study; `out` exists and is no report, or its folder does not exist; no such model.
     coupling.studies.design.StudyError
         A study whose definition cannot be read.
@@ -53,11 +55,14 @@ def write_report(path: str | Path, out: str | Path | None = None, model: str | N
 
         target = _checked_path(folder, out)
         data, parts, scripts = study_page.collect(folder, target.parent, model), study_markup.parts, study_page.SCRIPTS
-    text = document(*parts(data), data["player"], _file("page.css"), "\n".join(map(_file, scripts)), MARK)
-    with tempfile.NamedTemporaryFile("w", dir=target.parent, suffix=".html", delete=False, encoding="utf-8") as stream:
-        stream.write(text)
-    os.chmod(stream.name, 0o644)
-    os.replace(stream.name, target)
+    text = document(
+        *parts(data),
+        data["player"] | {"quantities": QUANTITIES},
+        _file("page.css"),
+        "\n".join(map(_file, scripts)),
+        MARK,
+    )
+    replace_file(target, text)
     return target
 
 
@@ -82,7 +87,7 @@ def study_folder(path: str | Path) -> Path | None:
 
     Raises
     ------
-    RunRefused
+    Refused
         A folder that holds neither or both.
     """
     from coupling.studies.execute import DATA_FILE, STUDY_FILE
@@ -92,11 +97,11 @@ def study_folder(path: str | Path) -> Path | None:
         return path.parent if path.is_file() and path.name in (STUDY_FILE, DATA_FILE) else None
     run, study = (path / RUN_FILE).exists(), (path / STUDY_FILE).exists()
     if run and study:
-        raise RunRefused(f"'{path}': holds a run ({RUN_FILE}) and a study ({STUDY_FILE}); name one of these files")
+        raise Refused(f"'{path}': holds a run ({RUN_FILE}) and a study ({STUDY_FILE}); name one of these files")
     if not run and not study:
         inner = sorted(file.parent.name for name in (RUN_FILE, STUDY_FILE) for file in path.glob(f"*/{name}"))
         hint = f", for instance {path / inner[0]}" if inner else ""
-        raise RunRefused(
+        raise Refused(
             f"'{path}': must be the folder of a run (with {RUN_FILE}) or of a study (with {STUDY_FILE}), it holds "
             f"neither; give the one that `gush run` or `gush study` wrote{hint}"
         )
@@ -108,9 +113,9 @@ def _checked_path(folder, out):
     if path.is_dir():
         path = path / REPORT_FILE
     if not path.absolute().parent.is_dir():
-        raise RunRefused(f"report '{path}': its folder does not exist; make it or choose another --out")
+        raise Refused(f"report '{path}': its folder does not exist; make it or choose another --out")
     if path.exists() and not is_report(path):
-        raise RunRefused(f"report '{path}': exists and is no report of this program; choose another --out")
+        raise Refused(f"report '{path}': exists and is no report of this program; choose another --out")
     return path
 
 

@@ -2,17 +2,14 @@
 
 from html import escape
 
-from coupling.report.frame import duration, figure, header, provenance, rows_of_facts, shown
+from coupling.report.frame import figure, header, provenance, rows_of_facts, shown
+from coupling.runs.progress_line import duration
+from structure.response import FORCES, PRESSURES, SHOWN
 
 VERDICTS = {True: "as expected", False: "look at this", None: "–", "poor": "poor: look at this"}
 MODEL_QUESTION = "Lining models side by side"
-RING_CHARTS = (
-    ("soil_pressure", "Effective soil pressure", "kPa"),
-    ("water_pressure", "Water pressure", "kPa"),
-    ("soil_shear", "Shear of the soil on the lining", "kPa"),
-    ("axial_force", "Axial force N", "kN/m"),
-    ("shear_force", "Shear force Q", "kN/m"),
-    ("bending_moment", "Bending moment M", "kN m/m"),
+RING_CHARTS = tuple(
+    (name, SHOWN[name].name[0].upper() + SHOWN[name].name[1:], SHOWN[name].unit) for name in (*PRESSURES, *FORCES)
 )
 
 

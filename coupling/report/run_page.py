@@ -2,21 +2,17 @@
 
 import xarray as xr
 
-from coupling.datasets import RunFileError, identifier, read_run, run_file, structure_group
+from coupling.datasets import RunFileError, identifier, opened, read_run, structure_group
+from coupling.datasets.geometry import tunnels_beside
+from coupling.datasets.tree import model_names
+from coupling.postprocess.summary import summarise_run
+from coupling.refused import Refused
 from coupling.report.fields import field_snapshots, mesh_picture
 from coupling.report.numbers import key_numbers, quality, warnings
 from coupling.report.packing import packed
-from coupling.report.scene_facts import facts, left_out, read_scene, section
-from coupling.report.series import (
-    choose_frames,
-    history_series,
-    lining_series,
-    model_names,
-    model_series,
-    tunnels_beside,
-)
-from coupling.run_folder import RunRefused
-from coupling.summary import summarise_run
+from coupling.report.scene_facts import left_out, read_scene, section
+from coupling.report.series import choose_frames, history_series, lining_series, model_series
+from coupling.scenes.facts import facts
 
 SCRIPTS = (
     "unpack.js", "run_data.js", "charts.js", "tables.js", "slider.js", "ring_views.js", "history_views.js",
@@ -39,13 +35,15 @@ def collect(run, model=None):
         attributes, summary, numbers, quality, warnings, notes, facts, left_out: for the text; player: what the script
         draws, JSON.
     """
-    tree = _led_by(read_run(run), model)
+    with opened(run) as file:
+        tree = _led_by(read_run(file), model)
+        if "history" not in tree.children or "lining" not in tree.children:
+            raise RunFileError(f"run file '{file.path}': it holds no run; give the folder that `gush run` wrote")
+        if not min(tree["lining"].sizes["time"], tree["history"].sizes["time"]):
+            raise RunFileError(f"run file '{file.path}': has no complete record yet; wait for the first one")
+        summary = summarise_run(file)
     attributes = {name: _plain(value) for name, value in tree.attrs.items()}
-    if "history" not in tree.children or "lining" not in tree.children:
-        raise RunFileError(f"run file '{run_file(run)}': it holds no run; give the folder that `gush run` wrote")
-    if not min(tree["lining"].sizes["time"], tree["history"].sizes["time"]):
-        raise RunFileError(f"run file '{run_file(run)}': has no complete record yet; wait for the first one")
-    scene, summary = read_scene(attributes), summarise_run(run)
+    scene = read_scene(attributes)
     quality_rows = quality(tree, summary, scene)
     frames = choose_frames(tree)
     fields = field_snapshots(tree["points"].to_dataset()) if "points" in tree.children else None
@@ -67,7 +65,7 @@ def _led_by(tree, model):
     if model is None:
         return tree
     if model not in model_names(tree):
-        raise RunRefused(
+        raise Refused(
             f"--model: must be a lining model that has answered, got {model!r}; there are "
             f"{', '.join(model_names(tree)) or 'none'}: run gush respond first"
         )
@@ -82,10 +80,10 @@ def _player(tree, scene, frames, fields):
     return {
         "time": packed(times),
         "inflow_mass": packed(lining["inflow_mass"].values[frames]),
-        "section": section(scene, lining.attrs),
+        "section": section(scene, lining),
         "lining": lining_series(tree, frames),
         "models": _models(tree, None, times),
-        "models_beside": {k: _models(tree, k, times) for k in tunnels_beside(tree)},
+        "models_beside": {k: _models(tree, k, times) for k in tunnels_beside(tree["lining"])},
         "history": history_series(tree),
         "mesh": mesh_picture(tree["mesh"].to_dataset()) if "mesh" in tree.children else None,
         "fields": fields,

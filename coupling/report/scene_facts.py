@@ -1,6 +1,8 @@
-"""What was computed: the scene in numbers, its section through the ground, and what was left out."""
+"""The scene of a run, read again from its text: its section through the ground, and what was left out."""
 
-from coupling.scene import SceneError, parse_scene
+from coupling.datasets.geometry import gate_of, has_tunnels, tunnel_list
+from coupling.refused import SceneError
+from coupling.scenes.scene import parse_scene
 
 
 def read_scene(attributes):
@@ -12,73 +14,21 @@ def read_scene(attributes):
 
 
 def left_out(scene):
-    """What was active and what was left out: list of {feature, active, reason}, see :func:`coupling.plan.features`."""
-    from coupling.plan import features
+    """What was active and what was left out: rows of :func:`coupling.scenes.features.features`."""
+    from coupling.scenes.features import features
 
     # the number of threads is no part of the scene and changes no result
     return [row for row in features(scene, 1) if row["feature"] != "several threads"]
 
 
-def facts(scene):
-    """Numbers of a scene that an engineer asks for first: list of (what, value as text)."""
-    from coupling.plan import initial_k0_text
-
-    s = scene.mpm
-    rows = [("box", f"{s.box.width:g} m wide, {s.box.depth:g} m deep")]
-    rows.append(("water table", "dry ground" if s.water is None else f"{s.water.table_depth:g} m below the surface"))
-    if s.is_undrained:
-        rows.append(("drainage", "none: water moves with the grains"))
-    if s.water is not None:
-        rows.append(("bulk modulus of the water", f"{s.water.bulk_modulus / 1e6:g} MPa"))
-    for soil in s.soils:
-        strength = ""
-        if soil.model == "mohr-coulomb":
-            strength = f", c' {soil.cohesion / 1e3:g} kPa, φ' {soil.friction_angle:g}°, ψ {soil.dilatancy_angle:g}°"
-        known = s.is_two_phase and soil.hydraulic_conductivity is not None
-        flow = "" if not known else f", k {soil.hydraulic_conductivity:.3g} m/s"
-        rows.append((
-            f"soil '{soil.name}' from {soil.top_depth:g} m",
-            f"{soil.model}, E {soil.youngs_modulus / 1e6:g} MPa, ν {soil.poissons_ratio:g}{strength}, "
-            f"porosity {soil.porosity:g} (loose {soil.loose_porosity:g}), {initial_k0_text(s, soil)}{flow}",
-        ))  # fmt: skip
-    for k, tunnel in enumerate(s.tunnels):
-        name = "tunnel" if len(s.tunnels) == 1 else f"tunnel {k}"
-        rows.append((
-            name,
-            f"cover {tunnel.cover:g} m, outer diameter {tunnel.outer_diameter:g} m, inner {tunnel.inner_diameter:g} m, "
-            f"friction {tunnel.friction_coefficient:g}",
-        ))  # fmt: skip
-    if s.gate is not None:
-        rows.append(("gate in the lining", f"{1e3 * s.gate.width:g} mm wide, {s.gate.angle:g}° from the crown"))
-    stops = [f"{s.stop.inflow_mass:g} kg/m of inflow"] if s.stop.inflow_mass is not None else []
-    stops += [f"{s.stop.time:g} s"] if s.stop.time is not None else []
-    rows.append(("until", " or ".join(stops)))
-    d = s.discretisation
-    rows.append(("elements", f"{d.element_size:g} m, at the lining {d.element_size_lining:g} m"))
-    if scene.ring is not None:
-        ring = scene.ring
-        rows.append((
-            "ring",
-            f"{len(ring.joint_angles)} joints, thickness {1e3 * ring.thickness:g} mm, concrete E "
-            f"{ring.concrete_modulus / 1e9:g} GPa",
-        ))  # fmt: skip
-        if ring.joint_angles:
-            rows.append((
-                "joints",
-                f"rotation {ring.joint_rotational_stiffness / 1e6:g} MN m/rad, normal "
-                f"{ring.joint_normal_stiffness / 1e6:g} MN/m, shear {ring.joint_shear_stiffness / 1e6:g} MN/m, a metre",
-            ))  # fmt: skip
-    return rows
-
-
-def section(scene, geometry):
+def section(scene, lining):
     """What the page needs to draw the ground in section.
 
     Parameters
     ----------
     scene : coupling.Scene or None
-    geometry : dict
-        Attributes of `/lining`: tunnels and gate.
+    lining : xarray.Dataset
+        `/lining`, whose attributes are tunnels and gate.
 
     Returns
     -------
@@ -86,21 +36,10 @@ def section(scene, geometry):
         tunnels: list of {x, y, outer, inner} [m]; gate: {tunnel, angle [degree], width [m]} or None; box: {width,
         depth} or None; water_table: depth [m] or None; soils: list of {name, top}.
     """
-    from numpy import atleast_1d
-
-    names = ("tunnel_x", "tunnel_axis_depth", "tunnel_outer_radius", "tunnel_inner_radius")
-    columns = [atleast_1d(geometry[name]) for name in names] if names[0] in geometry else [(), (), (), ()]
-    tunnels = [
-        {"x": float(x), "y": -float(depth), "outer": float(outer), "inner": float(inner)}
-        for x, depth, outer, inner in zip(*columns, strict=True)
-    ]
-    gate = None
-    if "gate_angle" in geometry:
-        gate = {"tunnel": int(geometry["gate_tunnel"]), "angle": float(geometry["gate_angle"]),
-                "width": float(geometry["gate_width"])}  # fmt: skip
+    gate = gate_of(lining)
     return {
-        "tunnels": tunnels,
-        "gate": gate,
+        "tunnels": [tunnel._asdict() for tunnel in (tunnel_list(lining) if has_tunnels(lining) else ())],
+        "gate": None if gate is None else gate._asdict(),
         "box": None if scene is None else {"width": scene.mpm.box.width, "depth": scene.mpm.box.depth},
         "water_table": None if scene is None or scene.mpm.water is None else scene.mpm.water.table_depth,
         "soils": [] if scene is None else [{"name": s.name, "top": s.top_depth} for s in scene.mpm.soils],

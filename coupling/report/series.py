@@ -4,11 +4,13 @@ import json
 
 import numpy as np
 
-from coupling.datasets import RunFileError, structure_group
+from coupling.datasets import RunFileError
+from coupling.datasets.geometry import tunnels_beside
+from coupling.datasets.tree import match_times, model_names
 from coupling.report.packing import BASE64, evenly, packed
+from structure.response import FORCES, PRESSURES
 
-PRESSURES = ("soil_pressure", "water_pressure", "soil_shear")
-RING_FIELDS = ("axial_force", "shear_force", "bending_moment", "displacement_radial", "displacement_tangential")
+RING_FIELDS = (*FORCES, "displacement_radial", "displacement_tangential")
 JOINT_FIELDS = (
     "joint_axial_force", "joint_shear_force", "joint_bending_moment",
     "joint_opening", "joint_dislocation", "joint_rotation",
@@ -25,23 +27,9 @@ def choose_frames(run):
     """
     lining = run["lining"].to_dataset()
     fields = len(PRESSURES) * lining.sizes.get("tunnel", 1)
-    fields += len(RING_FIELDS) * sum(len(model_names(run, tunnel)) for tunnel in (None, *tunnels_beside(run)))
+    fields += len(RING_FIELDS) * sum(len(model_names(run, tunnel)) for tunnel in (None, *tunnels_beside(run["lining"])))
     bytes_each = 4 * BASE64 * fields * 360
     return evenly(lining.sizes["time"], min(MOST_FRAMES, int(BYTES_OF_FRAMES / bytes_each)))
-
-
-def model_names(run, tunnel=None):
-    """Lining models by their users' names that answered for a tunnel (None: that with the gate), the leading first."""
-    home = structure_group("", tunnel).rstrip("/")
-    answered = run[home].children if home in run.children else {}
-    return [str(response.attrs.get("model", group)) for group, response in answered.items()]
-
-
-def tunnels_beside(run):
-    """Numbers of the tunnels without the gate."""
-    lining = run["lining"].to_dataset()
-    gate = int(lining.attrs.get("gate_tunnel", 0))
-    return [k for k in range(lining.sizes.get("tunnel", 1)) if k != gate]
 
 
 def lining_series(run, frames):
@@ -104,14 +92,6 @@ def model_series(name, response, times):
                 **at_frames(response[n])} for n in on_time
         },
     }  # fmt: skip
-
-
-def match_times(available, wanted):
-    """For every wanted time the record with that time, and whether there is one: (n,) int64, (n,) bool."""
-    if not len(available):
-        return np.zeros(len(wanted), int), np.zeros(len(wanted), bool)
-    rows = np.clip(np.searchsorted(available, wanted - 1e-9), 0, len(available) - 1)
-    return rows, np.abs(available[rows] - wanted) <= 1e-9 * np.maximum(1.0, np.abs(wanted))
 
 
 def history_series(run):

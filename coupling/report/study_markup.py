@@ -2,10 +2,12 @@
 
 from html import escape
 
-from coupling.quality import ERRORS
-from coupling.report.frame import duration, figure, header, provenance, rows_of_facts, scroll, shown
+from coupling.postprocess.quality import ERRORS
+from coupling.report.frame import figure, header, provenance, rows_of_facts, scroll, shown
 from coupling.report.run_markup import RING_CHARTS
+from coupling.runs.progress_line import duration
 from coupling.studies.design import short_names, value_text
+from structure.response import SHOWN
 
 #: Of the run's key numbers those that stand in the table of cases, with their short headings.
 COLUMNS = {
@@ -17,8 +19,8 @@ COLUMNS = {
     "shear_force_min": "smallest Q",
     "bending_moment_max": "largest M",
     "bending_moment_min": "smallest M",
-    "joint_opening_max": "joint opening (+) or closing (−)",
-    "convergence_vertical": "vertical diameter shorter (+) or longer (−)",
+    "joint_opening_max": SHOWN["joint_opening"].name,
+    "convergence_vertical": SHOWN["convergence_vertical"].name,
 }
 PROGRESS_CHARTS = (
     ("inflow_over_time", "Inflow mass over time", "kg/m"),
@@ -26,12 +28,12 @@ PROGRESS_CHARTS = (
     ("zone_over_mass", "Flow zone over inflow mass", "m²"),
 )
 MASS_CHARTS = (
-    ("axial_over_mass", "Largest and smallest N", "kN/m"),
-    ("shear_over_mass", "Largest and smallest Q", "kN/m"),
-    ("moment_over_mass", "Largest and smallest M", "kN m/m"),
-    ("opening_over_mass", "Largest joint opening (+) or closing (−)", "mm"),
-    ("rotation_over_mass", "Largest size of joint rotation", "mrad"),
-    ("convergence_over_mass", "Vertical diameter shorter (+) or longer (−)", "mm"),
+    ("axial_over_mass", "Largest and smallest N", SHOWN["axial_force"].unit),
+    ("shear_over_mass", "Largest and smallest Q", SHOWN["shear_force"].unit),
+    ("moment_over_mass", "Largest and smallest M", SHOWN["bending_moment"].unit),
+    ("opening_over_mass", f"Largest {SHOWN['joint_opening'].name}", SHOWN["joint_opening"].unit),
+    ("rotation_over_mass", f"Largest size of {SHOWN['joint_rotation'].name}", SHOWN["joint_rotation"].unit),
+    ("convergence_over_mass", SHOWN["convergence_vertical"].name.capitalize(), SHOWN["convergence_vertical"].unit),
 )
 
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from coupling.quality import ERRORS, poor_errors
+from coupling.postprocess.extremes import RING_EXTREMES, shown_extreme
+from coupling.postprocess.quality import ERRORS, poor_errors
 from coupling.report.numbers import (
     DIFFERENCE,
-    RING_EXTREMES,
     THEORY_LIMIT,
     Number,
     ground_slips,
@@ -51,20 +51,20 @@ def case_numbers(dataset, models):
         for name, label, unit in INFLOW_NUMBERS
         if name in dataset.variables
     ]
-    for key, (label, unit, scale) in RING_EXTREMES.items() if models else ():
+    for key in RING_EXTREMES if models else ():
         values = [model[key] for model in models if key in model]
         if not values:
             continue
         others = [abs(other[end] - values[0][end]) for other in values[1:]]
         error = _finite(max(others)) if others else None
         numbers.append(
-            Number(key, label, unit, scale, _finite(values[0][0]), _finite(values[0][end]), error, DIFFERENCE)
+            Number(key, *shown_extreme(key), _finite(values[0][0]), _finite(values[0][end]), error, DIFFERENCE)
         )
     return numbers
 
 
 def balances(dataset):
-    """What a case conserves: name of :func:`coupling.quality.quality` to its value, where the case holds it."""
+    """What a case conserves: names of `coupling.postprocess.quality` to their values, where the case holds them."""
     names = {name: f"quality_{name}" for name in ERRORS}
     return {name: float(dataset[v]) for name, v in names.items() if v in dataset and np.isfinite(dataset[v])}
 
@@ -97,7 +97,7 @@ def case_warnings(dataset, scene):
 def run_facts(folder):
     """What the files of a case's run say: status, status_message, wall_seconds, revision; {} without a readable run."""
     from coupling.datasets import RunFileError, read_attributes
-    from coupling.run_folder import RUN_FILE
+    from coupling.files.folder import RUN_FILE
 
     if not (folder / RUN_FILE).is_file():
         return {}

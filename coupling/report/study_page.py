@@ -3,9 +3,10 @@
 import os
 from pathlib import Path
 
-from coupling.netcdf_group import read_group_at_once
+from coupling.datasets.group import read_group_at_once
+from coupling.files.folder import LOG_FILE, REPORT_FILE
+from coupling.refused import Refused
 from coupling.report.packing import evenly, packed
-from coupling.report.scene_facts import facts
 from coupling.report.study_numbers import NOT_RUN, balances, case_numbers, case_warnings, last_record, run_facts
 from coupling.report.study_series import (
     MOST_CASES,
@@ -15,7 +16,7 @@ from coupling.report.study_series import (
     ring_extremes_over_mass,
     slider_stops,
 )
-from coupling.run_folder import LOG_FILE, REPORT_FILE, RunRefused
+from coupling.scenes.facts import facts
 from coupling.studies.case import RUN_FOLDER
 from coupling.studies.collect import stored_cases, unreadable
 from coupling.studies.design import Range, StudyError, value_text
@@ -59,9 +60,7 @@ def collect(folder, beside, model=None):
     models = [model_name(backend) for backend in plan.backends]
     if model is not None:
         if model not in models:
-            raise RunRefused(
-                f"--model: must be one of the study, got {model!r}; there are {', '.join(models) or 'none'}"
-            )
+            raise Refused(f"--model: must be one of the study, got {model!r}; there are {', '.join(models) or 'none'}")
         models.insert(0, models.pop(models.index(model)))
     rows, whole, extremes = [], {}, {}
     for case in found:

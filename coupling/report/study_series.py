@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from coupling.postprocess.extremes import extremes, ring_extremes
 from coupling.report.packing import evenly, packed, packed_levels
+from structure.response import FORCES, PRESSURES
 
-PRESSURES = ("soil_pressure", "water_pressure", "soil_shear")
-FORCES = ("axial_force", "shear_force", "bending_moment")
 OVER_MASS = ("time", "flow_zone_area", "disturbed_area")
 BYTES_OF_CURVES = 5.2e6  # text of everything that has a value for each angle
 BYTES_OF_VALUE = 8 / 3  # two bytes, as base64
@@ -74,56 +74,14 @@ def case_series(dataset, extremes_of_models, step, records):
         "mass": packed(dataset["inflow_mass"].values),
         "over_mass": {name: packed(dataset[name].values) for name in OVER_MASS if name in dataset},
         "pressures": {name: packed_levels(values) for name, values in around.items()},
-        "extremes": {key: packed(v) for key, v in pressure_extremes(dataset).items()},
+        "extremes": {key: packed(v.values) for key, v in extremes(dataset, PRESSURES).items() if key != "inflow_mass"},
         "models": models,
     }
 
 
-def pressure_extremes(dataset):
-    """Extremes of the pressures around the lining and where they are: NAME_max, NAME_max_angle .. (n_progress,) SI."""
-    return _around(dataset, PRESSURES, "theta")
-
-
 def ring_extremes_over_mass(dataset):
-    """Extremes of every lining model's answer, over inflow mass.
+    """Extremes of every lining model's answer to a case in memory, over inflow mass.
 
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        A case, in memory.
-
-    Returns
-    -------
-    list of dict
-        For each of its models: keys of :data:`coupling.report.numbers.RING_EXTREMES` to (n_progress,) SI; for forces
-        also KEY_angle [degree], where the extreme is.
+    returns list of dict, one a model: of :func:`coupling.postprocess.extremes.ring_extremes`.
     """
-    count = dataset.sizes.get("model", 0)
-    return [_extremes_of(dataset.isel(model=k)) for k in range(count)]
-
-
-def _extremes_of(model):
-    found = _around(model, FORCES, "theta")
-    if model.sizes.get("joint"):
-        found["joint_opening_max"] = model["joint_opening"].max("joint").values
-        found["joint_rotation_max"] = abs(model["joint_rotation"]).max("joint").values
-    for name in ("convergence_horizontal", "convergence_vertical"):
-        if name in model:
-            found[name] = model[name].values
-    return found
-
-
-def _around(dataset, names, along):
-    """As :func:`coupling.postprocess.extremes` of a dataset over `progress`, plain arrays; NaN where no value is known.
-
-    returns dict: NAME_max, NAME_max_angle, NAME_min, NAME_min_angle to (n_progress,).
-    """
-    found, angles = {}, dataset[along].values
-    for name in names:
-        values = dataset[name].transpose("progress", along).values
-        known = np.isfinite(values).any(axis=1)
-        for extreme, sign in (("max", 1.0), ("min", -1.0)):
-            at = np.argmax(np.where(np.isnan(values), -np.inf, sign * values), axis=1)
-            found[f"{name}_{extreme}"] = np.take_along_axis(values, at[:, None], axis=1)[:, 0]
-            found[f"{name}_{extreme}_angle"] = np.where(known, angles[at], np.nan)
-    return found
+    return [ring_extremes(dataset.isel(model=k)) for k in range(dataset.sizes.get("model", 0))]

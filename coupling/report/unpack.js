@@ -15,15 +15,10 @@ function unpackAll(entries) {
   return Object.fromEntries(Object.entries(entries).map(([name, entry]) => [name, unpack(entry)]));
 }
 
-const QUANTITIES = {
-  soil_pressure: ["kPa", 1e-3], water_pressure: ["kPa", 1e-3], soil_shear: ["kPa", 1e-3],
-  axial_force: ["kN/m", 1e-3], shear_force: ["kN/m", 1e-3], bending_moment: ["kN m/m", 1e-3],
-  joint_axial_force: ["kN/m", 1e-3], joint_shear_force: ["kN/m", 1e-3], joint_bending_moment: ["kN m/m", 1e-3],
-  joint_opening: ["mm", 1e3], joint_dislocation: ["mm", 1e3], joint_rotation: ["mrad", 1e3],
-  convergence_horizontal: ["mm", 1e3], convergence_vertical: ["mm", 1e3], settlement: ["mm", 1e3],
-};
+// Name of a quantity to the unit it is shown in and the factor to it.
+const QUANTITIES = data.quantities;
 
-// As coupling.report.markup.shown: three significant digits, whole numbers from 100 on, a true minus sign.
+// As coupling.report.frame.shown: three significant digits, whole numbers from 100 on, a true minus sign.
 function shown(value) {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);

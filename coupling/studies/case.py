@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -37,15 +36,19 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, 
 
     Raises
     ------
-    mpm.RunFailed, structure.LiningFailure, coupling.run_folder.RunRefused
+    mpm.RunFailed, structure.LiningFailure, coupling.refused.Refused
         As :func:`coupling.run`; the study goes on without the case.
     """
 
-    from coupling.datasets import read_history, read_pressures, write_response
-    from coupling.provenance import root_attributes
-    from coupling.run import gate_tunnel, respond, respond_beside, run
-    from coupling.run_folder import RUN_FILE, RunRefused
-    from coupling.scene import parse_scene
+    from coupling.datasets import read_history, read_pressures, write_dataset, write_responses
+    from coupling.datasets.geometry import on_tunnel
+    from coupling.files.folder import RUN_FILE
+    from coupling.files.provenance import root_attributes
+    from coupling.files.replace import replaced
+    from coupling.refused import Refused
+    from coupling.responses.respond import responses_on
+    from coupling.runs.run import run
+    from coupling.scenes.scene import parse_scene
     from coupling.studies.progress import CaseProgress
     from structure.models import lining_model, model_name
 
@@ -62,24 +65,22 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, 
     report = CaseProgress(place)
     try:
         run(scene, run_folder, threads=threads, resume=True, progress=report)
-    except RunRefused:
+    except Refused:
         # nothing there yet, or what is there began with other versions or has failed
         run(scene, run_folder, overwrite=True, threads=threads, progress=report)
     report({"stage": "respond"})
     pressures, history = read_pressures(run_folder), read_history(run_folder)
-    if "tunnel" in pressures.dims:
-        pressures = pressures.isel(tunnel=gate_tunnel(scene), drop=True)
-    responses = {}
+    answers, responses = {}, {}
     for name, backend in models.items():
-        responses[name] = respond(scene, pressures, backend)
-        write_response(run_folder / RUN_FILE, responses[name], name)
-        respond_beside(scene, run_folder, backend)
+        answers |= responses_on(scene, pressures, backend)
+        responses[name] = answers[name, None]
+    if answers:
+        write_responses(run_folder / RUN_FILE, answers)
     last = scene.mpm.stop.inflow_mass or float(history["inflow_mass"].values[-1])
-    result = at_inflow_masses(pressures, history, responses, np.linspace(0.0, last, records))
+    result = at_inflow_masses(on_tunnel(pressures), history, responses, np.linspace(0.0, last, records))
     result.attrs = root_attributes(scene)
-    waiting = place / f"{CASE_FILE}.{os.getpid()}"
-    result.to_netcdf(waiting, engine="h5netcdf")
-    waiting.replace(done)
+    with replaced(done) as beside:
+        write_dataset(beside, result)
     report.end()
     return str(done)
 
@@ -106,7 +107,7 @@ def at_inflow_masses(pressures, history, responses, masses):
     import xarray as xr
 
     from coupling.datasets import BALANCES
-    from coupling.quality import quality
+    from coupling.postprocess.quality import quality
 
     reached, unique = _times(history, masses)
     parts = [_at(pressures[["soil_pressure", "water_pressure", "soil_shear"]], reached)]
@@ -161,9 +162,13 @@ def _at(dataset, times):
     """A dataset at some times, NaN where the time is NaN, with the dimension `progress` in place of time."""
     import xarray as xr
 
-    points = xr.DataArray(np.nan_to_num(times, nan=float(dataset["time"][0])), dims="progress")
-    there = xr.DataArray(np.isfinite(times), dims="progress")
-    picked = dataset.interp(time=points, assume_sorted=True).where(there)
-    for name in picked.data_vars:
-        picked[name].attrs = dict(dataset[name].attrs)
-    return picked.drop_vars("time")
+    known, stored = np.isfinite(times), dataset["time"].values
+    times = np.where(known, times, stored[0])
+    after = np.minimum(np.searchsorted(stored, times), len(stored) - 1)
+    before = np.maximum(after - 1, 0)
+    width = np.where(after > before, stored[after] - stored[before], 1.0)
+    share = xr.DataArray((times - stored[before]) / width, dims="progress")
+    values = dataset.drop_vars("time")
+    low, high = (values.isel(time=xr.DataArray(rows, dims="progress")) for rows in (before, after))
+    with xr.set_options(keep_attrs=True):
+        return (low + share * (high - low)).where(xr.DataArray(known, dims="progress"))

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coupling.netcdf_group import read_group_at_once
-from coupling.provenance import origin, with_history
+from coupling.datasets.group import read_group_at_once
+from coupling.files.provenance import origin, with_history
+from coupling.scenes.scene import unit_of
 from coupling.studies.design import Case, Study, StudyError
 
 if TYPE_CHECKING:
@@ -67,7 +68,8 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     result = result.assign_coords(case_name=("case", names, {"long_name": "what the case changes"}))
     for name in plan.parameters:
         values = _column([case.parameters[name] for case in cases])
-        result = result.assign_coords({name.replace(".", "_"): ("case", values, {"long_name": name})})
+        about = {"long_name": name} | ({"units": units_of(name)} if values.dtype.kind in "fiu" else {})
+        result = result.assign_coords({name.replace(".", "_"): ("case", values, about)})
     if "scene" in plan.parameters:
         result = result.assign_coords(_of_scenes(cases))
     done = np.array([case in there for case in cases])
@@ -82,6 +84,11 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
         "failed": int((~done).sum()),
     }
     return result
+
+
+def units_of(name: str) -> str:
+    """Units of a parameter as datasets spell them."""
+    return (unit_of(name) or "1").replace("**", "^").replace("*", " ")
 
 
 def _column(values):
@@ -126,16 +133,11 @@ def stored_cases(folder: str | Path) -> tuple[Study, list[Case], dict[str, str]]
     coupling.studies.design.StudyError
         No study there, or its files are damaged.
     """
-    from coupling.studies.design import cases, load_study
-    from coupling.studies.execute import STATUS_FILE, STUDY_FILE
+    from coupling.studies.design import cases, stored_study
+    from coupling.studies.execute import STATUS_FILE
 
     folder = Path(folder)
-    try:
-        plan = load_study(json.loads((folder / STUDY_FILE).read_text(encoding="utf-8")))
-    except FileNotFoundError:
-        raise StudyError(f"study folder '{folder}': must hold {STUDY_FILE}, got none; run gush study first") from None
-    except ValueError as error:
-        raise StudyError(f"study folder '{folder}': {STUDY_FILE} must be that of a study, got: {error}") from None
+    plan = stored_study(folder)
     found = cases(plan)
     try:
         text = (folder / STATUS_FILE).read_text(encoding="utf-8") if (folder / STATUS_FILE).is_file() else "{}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import hashlib
 import itertools
+import json
 import math
 import re
 from dataclasses import dataclass
@@ -16,21 +17,15 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from coupling.scene import (
-    Scene,
-    SceneError,
-    changed,
-    make_scene,
-    nested,
-    number_in_unit,
-    parse_toml,
-    read_scene_data,
-    read_toml_file,
-)
-from coupling.scene_lines import line_of
+from coupling.refused import SceneError
+from coupling.scenes.layers import changed, nested, parse_toml, read_scene_data, read_toml_file
+from coupling.scenes.lines import line_of
+from coupling.scenes.scene import Scene, make_scene, number_in_unit
+from structure.inputs import mistakes
 
 #: Changes when stored cases can no longer be used.
 FORMAT = "2"
+STUDY_FILE = "study.json"
 #: What stands for a whole table that a case leaves as the scene has it, and for a case that changes nothing.
 AS_IT_IS = "as it is"
 
@@ -112,8 +107,7 @@ class Study(BaseModel):
         for name, values in parameters.items():
             values = values.tolist() if hasattr(values, "tolist") else values
             if isinstance(values, dict):
-                values = {key: _in_unit(name, value) if key in ("low", "high") else value
-                          for key, value in values.items()}  # fmt: skip
+                values = _range(name, values)
             elif not isinstance(values, list | tuple | Range):
                 raise ValueError(f"{name}: must be a list of values or a range, got {values!r}; write [{values!r}], or "
                                  "give it under fixed")  # fmt: skip
@@ -202,7 +196,7 @@ def value_text(value: Any) -> str:
 
 
 def load_study(study: str | Path | dict | Study) -> Study:
-    """A study from a built-in name, a TOML file, a nested dictionary, or as it is.
+    """A study from a built-in name, a TOML file, the folder of one that ran, a nested dictionary, or as it is.
 
     Raises
     ------
@@ -211,6 +205,8 @@ def load_study(study: str | Path | dict | Study) -> Study:
     """
     if isinstance(study, Study):
         return study
+    if is_folder(study):
+        return stored_study(study)
     origin = "study" if isinstance(study, dict) else f"study '{study}'"
     text = "" if isinstance(study, dict) else _read(str(study))
     data = study if isinstance(study, dict) else parse_toml(text, origin)
@@ -218,15 +214,11 @@ def load_study(study: str | Path | dict | Study) -> Study:
         return Study.model_validate(data)
     except ValidationError as error:
         lines = []
-        for item in error.errors():
-            where = ".".join(str(part) for part in item["loc"] if part not in ("tuple[any, ...]", "Range"))
-            message = f"{where}: {item['msg'].removeprefix('Value error, ')}".removeprefix(": ")
-            if item["type"] == "extra_forbidden":
-                near = difflib.get_close_matches(where, Study.model_fields, 1)
-                message += f"; did you mean {near[0]!r}?" if near else f"; known: {', '.join(Study.model_fields)}"
+        for where, message in mistakes(error, Study):
+            message = ": ".join([*[".".join(map(str, where))] * bool(where), message])
             if ";" not in message:
                 message += "; correct it, `gush study table-2` is an example"
-            number = _line(text, item["loc"] or re.findall(r"\w+", message)[:1])
+            number = _line(text, where or re.findall(r"\w+", message)[:1])
             lines.append(f"line {number}: {message}" if number else message)
         raise StudyError("\n  ".join([f"{origin} has {len(lines)} mistake{'s' * (len(lines) > 1)}:", *lines])) from None
 
@@ -236,6 +228,27 @@ def _line(text, location):
     location = tuple(location)
     found = (line_of(text, location[:k]) for k in range(len(location), 0, -1)) if text else ()
     return next((number for number in found if number is not None), None)
+
+
+def is_folder(study: object) -> bool:
+    """Whether a study is given by the folder of one that ran; names of built-in ones come first."""
+    return isinstance(study, str | Path) and Path(study).is_dir() and str(study) not in study_names()
+
+
+def stored_study(folder: str | Path) -> Study:
+    """The definition of a study that ran earlier, from its folder.
+
+    Raises
+    ------
+    StudyError
+        No study there, or its file is damaged.
+    """
+    try:
+        return load_study(json.loads((Path(folder) / STUDY_FILE).read_text(encoding="utf-8")))
+    except FileNotFoundError:
+        raise StudyError(f"study folder '{folder}': must hold {STUDY_FILE}, got none; run gush study first") from None
+    except ValueError as error:
+        raise StudyError(f"study folder '{folder}': {STUDY_FILE} must be that of a study, got: {error}") from None
 
 
 def study_names() -> list[str]:
@@ -270,6 +283,15 @@ def cases(study: Study) -> list[Case]:
         # what a scene is already is no case more
         found.setdefault(key, Case(len(found), known, {name: known[name] for name in changes}, scene, key))
     return list(found.values())
+
+
+def _range(name, table):
+    ends = {key: _in_unit(name, value) if key in ("low", "high") else value for key, value in table.items()}
+    try:
+        return Range.model_validate(ends)
+    except ValidationError as error:
+        said = "; ".join(": ".join([*map(str, where), message]) for where, message in mistakes(error, Range))
+        raise ValueError(f"{name}: must be a list of values or a range; {said}") from None
 
 
 def _in_unit(name, value):
@@ -318,7 +340,14 @@ def _value_in(scene, name):
 def _code() -> str:
     """Hash of the sources that decide a result: `mpm`, `structure`, and what turns a run into a case."""
     total = hashlib.sha256(FORMAT.encode())
-    for package in ("mpm", "structure", "coupling.studies.case", "coupling.run", "coupling.datasets"):
+    for package in (
+        "mpm",
+        "structure",
+        "coupling.studies.case",
+        "coupling.runs",
+        "coupling.responses",
+        "coupling.datasets",
+    ):
         origin = Path(find_spec(package).origin)
         for file in sorted(origin.parent.rglob("*.py")) if origin.name == "__init__.py" else [origin]:
             total.update(file.read_bytes())

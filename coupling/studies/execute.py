@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+import numbers
 import os
 import time as clock
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from coupling.files.replace import replace_file
 from coupling.studies.case import CASE_FILE, run_case
-from coupling.studies.design import Case, Study, StudyError, cases, check_backends, load_study
+from coupling.studies.design import STUDY_FILE, Case, Study, StudyError, cases, check_backends, is_folder, load_study
 from coupling.studies.progress import StudyState, watching
 
 if TYPE_CHECKING:
@@ -20,7 +23,9 @@ if TYPE_CHECKING:
 LOSSES = 3
 #: Workers that were lost are started again within seconds [s].
 LONGEST_WITHOUT_WORKERS = 60.0
-CASES, STATUS_FILE, DATA_FILE, STUDY_FILE = "cases", "status.json", "study.nc", "study.json"
+#: What collecting and storing the cases loads; loaded while the workers load what they need.
+COLLECTING = ("xarray", "structure.lining", "pint", "h5netcdf", "dask.array")
+CASES, STATUS_FILE, DATA_FILE = "cases", "status.json", "study.nc"
 
 
 def study(
@@ -39,9 +44,9 @@ def study(
     Parameters
     ----------
     what : str, path, dict or Study
-        Built-in study, TOML file, or the same as a dictionary.
+        Built-in study, TOML file, the folder of a study that is to go on, or the same as a dictionary.
     out : str or path, optional
-        Folder; studies/NAME when left out. Studies may share one: equal cases are then shared.
+        Folder; the one that is to go on, or studies/NAME, when left out. Studies may share one, and then equal cases.
     workers : int, optional
         Processes on this machine, which share its cores; number of cores when left out; 0 runs in this process.
     scheduler : str, optional
@@ -63,10 +68,11 @@ def study(
     """
     from coupling.studies.collect import collect
 
+    _check_arguments(out, workers)
     plan = load_study(what)
     check_backends(plan)
     todo = cases(plan)
-    folder = Path(out) if out is not None else Path("studies") / plan.name
+    folder = study_folder(what, plan, out)
     tell = progress if progress is not None else lambda line: None
     try:
         (folder / CASES).mkdir(parents=True, exist_ok=True)
@@ -78,11 +84,15 @@ def study(
     failures: dict[str, str] = {}
     with watching(folder / CASES, {case.key: case.index for case in todo}, failures, watch):
         outcomes = _run(plan, list(missing.values()), folder, workers, scheduler)
-        for count, (case, failure) in enumerate(outcomes, start=1):
-            if failure:
-                failures[case.key] = failure
-            outcome = f"failed: {failure}" if failure else "done"
-            tell(f"{count} of {len(missing)}: {case.name}: {outcome}")
+        try:
+            for count, (case, failure) in enumerate(outcomes, start=1):
+                if failure:
+                    failures[case.key] = failure
+                outcome = f"failed: {failure}" if failure else "done"
+                tell(f"{count} of {len(missing)}: {case.name}: {outcome}")
+        except KeyboardInterrupt as stop:
+            stop.add_note(f"what is done is kept; go on with: gush study {folder}")
+            raise
     status = {
         case.key: {"parameters": case.parameters, "status": "failed" if case.key in failures else "finished",
                    "message": failures.get(case.key, "")}
@@ -90,6 +100,21 @@ def study(
     }  # fmt: skip
     _write_json(folder / STATUS_FILE, status)
     return collect(plan, todo, folder, failures)
+
+
+def study_folder(what: str | Path | dict | Study, plan: Study, out: str | Path | None) -> Path:
+    """Where a study is written: `out`, the folder that it was read from, or studies/NAME."""
+    if out is not None:
+        return Path(out)
+    return Path(what) if is_folder(what) else Path("studies") / plan.name
+
+
+def _check_arguments(out, workers):
+    if out is not None and not isinstance(out, str | os.PathLike):
+        raise StudyError(f"out: must be the path of a folder, got {out!r}; leave it out for studies/NAME")
+    whole = isinstance(workers, numbers.Integral) and not isinstance(workers, bool)
+    if workers is not None and not (whole and workers >= 0):
+        raise StudyError(f"workers: must be a whole number from 0, got {workers!r}; leave it out for one a core")
 
 
 def case_file(folder: Path, case: Case) -> Path:
@@ -131,8 +156,8 @@ def _in_processes(plan, missing, folder, count, threads):
     found = {case.key: case for case in missing}
     losses: dict[str, int] = {}
     with Pool(count) as pool:
-        import xarray  # noqa: F401, needed in the end, loaded while the workers load what they need
-
+        for module in COLLECTING:
+            import_module(module)
         for key, ended in pool.run(run_case, calls):
             if isinstance(ended, WorkerLost):
                 losses[key] = 1
@@ -233,6 +258,4 @@ def _text(failure):
 
 
 def _write_json(path: Path, data: Any):
-    waiting = path.with_suffix(f".{os.getpid()}")
-    waiting.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
-    waiting.replace(path)
+    replace_file(path, json.dumps(data, indent=1) + "\n")

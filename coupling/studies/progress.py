@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import threading
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+
+from coupling.files.replace import replace_file
 
 PROGRESS_FILE = "progress.json"
 SECONDS_BETWEEN_STATES = 1.0
@@ -36,10 +37,8 @@ class CaseProgress:
             return
         self._last = now
         kept = {name: state[name] for name in ("stage", "time", "inflow_mass", "share") if name in state}
-        waiting = self._path.with_suffix(f".{os.getpid()}")
         with contextlib.suppress(OSError):  # a full disk stops the run itself, where it loses something
-            waiting.write_text(json.dumps(kept), encoding="utf-8")
-            waiting.replace(self._path)
+            replace_file(self._path, json.dumps(kept), lasting=False)
 
     def end(self):
         """Take the state away: the case is done."""

@@ -1,4 +1,11 @@
-"""Which parameter of a study moves a quantity: rank correlations and main effects, and their pictures."""
+"""Which parameter of a study moves a quantity: rank correlations and main effects, and their pictures.
+
+Samples and correlations are scipy's (`scipy.stats.qmc`, `spearmanr`). The effects are our own, since they are to come
+out of the cases that there are: `scipy.stats.sobol_indices`, and SALib's Sobol and Morris, ask for samples of their
+own, n (d + 2) and n (d + 1) cases of d parameters with n up to hundreds, and know neither texts nor listed values
+nor the base of a one-at-a-time study. Of a linear function the squares of the effects are in the ratio of its Sobol
+indices.
+"""
 
 from __future__ import annotations
 
@@ -160,7 +167,7 @@ def tornado(result, label: str = "", scale: float = 1.0):
     import matplotlib
 
     from coupling.figures import STYLE
-    from coupling.picture import Picture
+    from coupling.figures.picture import Picture
 
     with matplotlib.rc_context(STYLE):
         names = result["parameter"].values[::-1]
@@ -198,7 +205,7 @@ def scatter(study, quantity, label: str = "", scale: float = 1.0):
     import matplotlib
 
     from coupling.figures import STYLE
-    from coupling.picture import Picture
+    from coupling.figures.picture import Picture
 
     names = [str(name) for name in sensitivity(study, quantity)["parameter"].values]
     parameters = parameters_of(study)
@@ -208,7 +215,8 @@ def scatter(study, quantity, label: str = "", scale: float = 1.0):
         for axes, name in zip(panels, names, strict=True):
             values = parameters[name]
             axes.plot(values, scale * quantity.values, "o", ms=4, color="#0b5394")
-            axes.set_xlabel(name)
+            unit = study[name].attrs.get("units", "1")
+            axes.set_xlabel(name if unit == "1" else f"{name} [{unit}]")
             axes.grid(True)
             if values.dtype.kind == "f" and values.min() > 0 and values.max() / values.min() > 30:
                 axes.set_xscale("log")

@@ -14,11 +14,9 @@ from multiprocessing.connection import Connection
 
 #: What a case needs and takes long to load; none of it starts a thread.
 LOADED = (
-    "coupling.run", "coupling.studies.case", "mpm.meshing", "mpm.simulation", "structure.beam_spring",
-    "scipy.interpolate", "gmsh", "meshio", "h5netcdf", "pint", "dask.array", "dask.distributed",
+    "coupling.runs.run", "coupling.studies.case", "mpm.meshing", "mpm.simulation", "structure.beam_spring",
+    "scipy.optimize", "gmsh", "meshio", "h5netcdf", "pint", "xarray", "dask.array",
 )  # fmt: skip
-
-
 INTERRUPTED, ALONE = 130, 131
 #: Exit codes after which nobody waits for a worker.
 ENDINGS = (0, INTERRUPTED, ALONE)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from pathlib import Path
 
-from coupling.run_folder import RunRefused
+from coupling.refused import Refused
 
 #: Shares of the last inflow mass at which a mesh ladder is compared; 0 is the initial state.
 SHARES = (0.0, 0.1, 0.25, 0.5, 1.0)
@@ -16,7 +16,7 @@ def problem_ladders(names, only_fast, out, tell):
 
     Raises
     ------
-    coupling.run_folder.RunRefused
+    coupling.refused.Refused
         Unknown problem.
     """
     from verification.accuracy.ladders import measure
@@ -28,7 +28,7 @@ def problem_ladders(names, only_fast, out, tell):
         if name not in known:
             near = difflib.get_close_matches(name, known, 1)
             hint = f"did you mean {near[0]!r}? " if near else ""
-            raise RunRefused(f"problem: must be a verification problem, got {name!r}; {hint}known: {', '.join(known)}")
+            raise Refused(f"problem: must be a verification problem, got {name!r}; {hint}known: {', '.join(known)}")
     rows = []
     for name in names or known:
         rows += measure(known[name], only_fast, tell)
@@ -43,9 +43,9 @@ def scene_ladder(name, inflow_mass, out, tell):
 
     scene = coupling.load_scene(name)
     if scene.mpm.gate is None or scene.ring is None:
-        raise RunRefused(f"scene: a mesh ladder needs a gate and a ring, got {name!r} without; add [gate] and [ring]")
+        raise Refused(f"scene: a mesh ladder needs a gate and a ring, got {name!r} without; add [gate] and [ring]")
     if not inflow_mass > 0:
-        raise RunRefused(f"inflow_mass: must be above 0 kg/m, got {inflow_mass:g}; 1000 is the published one")
+        raise Refused(f"inflow_mass: must be above 0 kg/m, got {inflow_mass:g}; 1000 is the published one")
     runs = run_ladder(name, Path(out) / "runs", inflow_mass, progress=tell)
     ladder = ladder_dataset(runs, [share * inflow_mass for share in SHARES])
     return write_ladder(ladder, scene.name, runs, Path(out))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def _figure(width, height):
-    from coupling.picture import Picture
+    from coupling.figures.picture import Picture
 
     return Picture(figsize=(width, height), layout="constrained")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from pathlib import Path
 
-from coupling.provenance import revision
+from coupling.files.provenance import revision
 from verification.accuracy import figures
 from verification.pages import made_by
 

@@ -50,7 +50,8 @@ def quantities(pressures, response, inflow_mass):
     inflow_mass : float
         [kg/m]; 0: the initial state.
     """
-    from coupling.postprocess import at_inflow
+    from coupling.postprocess import at_inflow, extremes
+    from structure.response import FORCES, SHOWN
 
     def now(dataset):
         return dataset.isel(time=0) if inflow_mass == 0 else at_inflow(dataset, inflow_mass)
@@ -62,13 +63,10 @@ def quantities(pressures, response, inflow_mass):
         near = np.abs((theta - angle + 180) % 360 - 180) <= HALF_ARC
         for name in ("soil", "water"):
             values[f"{name} pressure, {where}"] = (float(state[f"{name}_pressure"].values[near].mean()) / 1e3, "kPa")
-    for name, symbol, unit in (
-        ("axial_force", "N", "kN/m"),
-        ("shear_force", "Q", "kN/m"),
-        ("bending_moment", "M", "kN m/m"),
-    ):
-        values[f"{symbol} max"] = (float(forces[name].max()) / 1e3, unit)
-        values[f"{symbol} min"] = (float(forces[name].min()) / 1e3, unit)
+    for name in FORCES:
+        shown, found = SHOWN[name], extremes(forces, [name])
+        for kind in ("max", "min"):
+            values[f"{shown.short} {kind}"] = (shown.scale * found[f"{name}_{kind}"].item(), shown.unit)
     for joint in (2, 3):
         rotation = forces["joint_rotation"].sel(joint=joint)
         values[f"rotation, joint {joint}"] = (float(rotation) * 1e3, "mrad")
@@ -98,8 +96,9 @@ def run_ladder(name, folder, inflow_mass, levels=LEVELS, progress=None):
     """
     import coupling
     from coupling.datasets import read_attributes, read_history, write_response
-    from coupling.run import respond, run
-    from coupling.run_folder import RUN_FILE
+    from coupling.files.folder import RUN_FILE
+    from coupling.responses.respond import respond
+    from coupling.runs.run import run
 
     base = coupling.load_scene(name)
     runs = []

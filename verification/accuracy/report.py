@@ -6,7 +6,7 @@ import math
 from datetime import UTC, datetime
 from pathlib import Path
 
-from coupling.provenance import revision
+from coupling.files.provenance import revision
 from verification.accuracy import figures
 from verification.accuracy.ladders import assess, dataset
 from verification.pages import made_by

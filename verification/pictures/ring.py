@@ -11,11 +11,11 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from coupling.check_figures import checks
 from coupling.figures import GATE, INITIAL, NOW, RESOLUTION, SECOND, STYLE
+from coupling.figures.utilisations import checks
 from structure import BeamSpringLining, CapacityRule, Ground, Limits, Ring, SegmentSection, check, theory
+from structure.capacity import table_3_1
 from structure.joint_laws import contact_moment, limited_shear
-from structure.sections import table_3_1
 from verification.pages import DOCS
 
 STIFFNESS, HEIGHT = 5e8, 0.175  # N m/rad per metre, m

@@ -1,6 +1,6 @@
 """Exact answers for rings: internal forces and displacements in closed form.
 
-Signs as in :mod:`structure.lining`. Thin ring of centre-line radius R, inextensible and without shear deformation
+Signs as in :mod:`structure.response`. Thin ring of centre-line radius R, inextensible and without shear deformation
 unless said otherwise; here theta is in radians from the crown, clockwise.
 """
 

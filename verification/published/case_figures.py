@@ -5,8 +5,10 @@ from __future__ import annotations
 import matplotlib
 import numpy as np
 
-from coupling.figures import STYLE, _centred, _closed, _crown_up, _radial_ticks
-from coupling.picture import Picture
+from coupling.figures import STYLE
+from coupling.figures.picture import Picture
+from coupling.figures.polar import closed_curve, crown_up, radial_ticks
+from coupling.figures.ring import centred
 from verification.published.lining_figures import JOINTS
 from verification.published.sources import at_study_inflow
 
@@ -53,7 +55,7 @@ def deformation(study, inflow_mass, model="beam-spring"):
     radial = 1e3 * (now["displacement_radial"] - first["displacement_radial"])
     tangential = 1e3 * (now["displacement_tangential"] - first["displacement_tangential"])
     shape = radial.copy(data=np.stack([
-        _centred(angle, r, t)[0] for r, t in zip(radial.values, tangential.values, strict=True)
+        centred(angle, r, t)[0] for r, t in zip(radial.values, tangential.values, strict=True)
     ]))  # fmt: skip
     figure = _polar(
         study, {"additional radial deformation [mm]": (study["theta"].values, shape)},
@@ -114,14 +116,14 @@ def _polar(study, rows, title, extra_rows=0):
             low, high = min(0.0, known.min(initial=0.0)), known.max(initial=1e-9)
             for c, group in enumerate(GROUPS):
                 axis = figure.add_subplot(count, len(GROUPS), r * len(GROUPS) + c + 1, projection="polar")
-                _crown_up(axis)
+                crown_up(axis)
                 for k, (case, label) in enumerate(_members(study, group)):
-                    axis.plot(*_closed(angle, data[case]), color=f"C{k}", lw=1.1, label=label)
+                    axis.plot(*closed_curve(angle, data[case]), color=f"C{k}", lw=1.1, label=label)
                 if low < 0:
-                    axis.plot(*_closed(angle, 0 * angle), color="0.2", lw=0.7)
+                    axis.plot(*closed_curve(angle, 0 * angle), color="0.2", lw=0.7)
                     axis.set_rorigin(low - 0.4 * (high - low))
                 axis.set_ylim(low - 0.05 * (high - low) * (low < 0), high + 0.05 * (high - low))
-                _radial_ticks(axis, None, 4)
+                radial_ticks(axis, None, 4)
                 if r == 0:
                     axis.set_title(f"by {group}", pad=8)
                 if c == 0:

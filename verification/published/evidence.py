@@ -8,6 +8,7 @@ import numpy as np
 
 from coupling import postprocess
 from coupling.datasets import RunFileError, read_history, read_mesh, read_points, read_pressures, read_response
+from coupling.datasets.geometry import on_tunnel
 from verification.published.sources import CaseRun
 
 
@@ -41,9 +42,7 @@ class RunEvidence:
     @property
     def of_gate(self):
         """Pressures on the tunnel with the gate."""
-        if "tunnel" not in self.pressures.dims:
-            return self.pressures
-        return self.pressures.isel(tunnel=self.scene.mpm.gate.tunnel, drop=True)
+        return on_tunnel(self.pressures)
 
 
 def evidence(run: CaseRun) -> RunEvidence:
@@ -88,7 +87,7 @@ def initial_theory(scene, tunnel):
     import xarray as xr
 
     from coupling.datasets import cell_centres
-    from coupling.scene import ground_at_axis
+    from coupling.scenes.rings import ground_at_axis
 
     theta = cell_centres()
     angle = np.radians(theta)

@@ -7,8 +7,11 @@ import numpy as np
 from matplotlib.colors import TwoSlopeNorm
 
 from coupling import postprocess
-from coupling.figures import GATE, INITIAL, NOW, SECOND, STYLE, _frame, _Geometry
-from coupling.picture import Picture
+from coupling.datasets.geometry import tunnel_of
+from coupling.figures import GATE, INITIAL, NOW, SECOND, STYLE
+from coupling.figures.ground import frame_view
+from coupling.figures.picture import Picture
+from coupling.figures.tunnel import draw_linings
 
 
 def mass_colours(count):
@@ -132,8 +135,7 @@ def stress_variation_fields(fields, mesh, masses, name="soil_stress_vertical"):
     name : str
         Stress that varies.
     """
-    geometry = _Geometry(mesh)
-    x0, y0, radius = geometry.centre
+    x0, y0, radius, _ = tunnel_of(mesh)
     half = 4.0 * radius
     corners = mesh["element_nodes"].values
     ground = (mesh["region"] == 0).values
@@ -149,8 +151,8 @@ def stress_variation_fields(fields, mesh, masses, name="soil_stress_vertical"):
                 mesh["x"].values, mesh["y"].values, corners[shown], facecolors=ratio[shown], cmap="RdBu_r",
                 norm=TwoSlopeNorm(0.0, -1.0, 1.0), rasterized=True,
             )  # fmt: skip
-            geometry.draw(axis, zorder=3)
-            _frame(axis, x0, y0, half)
+            draw_linings(axis, mesh, zorder=3)
+            frame_view(axis, x0, y0, half)
             axis.set_title(f"{mass:.0f} kg/m")
             axis.set_xlabel("x [m]")
         axes[0].set_ylabel("y [m]")

@@ -6,20 +6,17 @@ import matplotlib
 import numpy as np
 
 from coupling import postprocess
-from coupling.figures import INITIAL, NOW, STYLE, _closed, _crown_up, _Geometry, _legend_below, _radial_ticks
-from coupling.picture import Picture
+from coupling.datasets.geometry import gate_of
+from coupling.figures import INITIAL, NOW, STYLE
+from coupling.figures.picture import Picture
+from coupling.figures.polar import around_zero, closed_curve, crown_up, legend_below, radial_ticks
+from coupling.figures.tunnel import mark_gate
+from structure.response import FORCES, SHOWN
 from verification.published.ground_figures import mass_colours
 
 PRESSURES = {"soil_pressure": "soil pressure", "water_pressure": "water pressure"}
-FORCES = {
-    "axial_force": "axial force N [kN/m]",
-    "shear_force": "shear force Q [kN/m]",
-    "bending_moment": "bending moment M [kN m/m]",
-}
 JOINTS = {
-    "joint_opening": ("opening (+) or closing (\N{MINUS SIGN}) [mm]", 1e3),
-    "joint_dislocation": ("dislocation [mm]", 1e3),
-    "joint_rotation": ("rotation [mrad]", 1e3),
+    name: (SHOWN[name].label, SHOWN[name].scale) for name in ("joint_opening", "joint_dislocation", "joint_rotation")
 }
 
 
@@ -81,22 +78,21 @@ def pressure_ratios_by_inflow(pressures, masses):
 
 
 def _rings(pressures, panels, labels):
-    geometry = _Geometry(pressures)
     angle = np.radians(pressures["theta"].values)
     colours = [INITIAL, *mass_colours(len(labels) - 1)]
     with matplotlib.rc_context(STYLE):
         figure = Picture(figsize=(7.2, 4.0), layout="constrained")
         axes = figure.subplots(1, 2, subplot_kw={"projection": "polar"})
         for axis, (title, rows) in zip(axes, panels.values(), strict=True):
-            _crown_up(axis)
+            crown_up(axis)
             for k, (label, row) in enumerate(zip(labels, rows, strict=True)):
                 dashes = {"ls": (0, (4, 2)), "lw": 1.1} if k == 0 else {}
-                axis.plot(*_closed(angle, row.values), color=colours[k], label=label, **dashes)
+                axis.plot(*closed_curve(angle, row.values), color=colours[k], label=label, **dashes)
             axis.set_ylim(0, 1.05 * max(float(row.max()) for row in rows))
-            _radial_ticks(axis, geometry)
-            geometry.mark_gate(axis)
+            radial_ticks(axis, gate_of(pressures))
+            mark_gate(axis, pressures)
             axis.set_title(title, pad=12)
-        _legend_below(figure, axes[0])
+        legend_below(figure, axes[0])
     return figure
 
 
@@ -117,20 +113,15 @@ def forces_by_inflow(response, masses):
     with matplotlib.rc_context(STYLE):
         figure = Picture(figsize=(7.4, 3.2), layout="constrained")
         axes = figure.subplots(1, 3, subplot_kw={"projection": "polar"})
-        for axis, (name, title) in zip(axes, FORCES.items(), strict=True):
-            _crown_up(axis)
-            axis.plot(*_closed(angle, 0 * angle), color="0.2", lw=0.8)
-            values = [state[name].values / 1e3 for _, state in states]
+        for axis, name in zip(axes, FORCES, strict=True):
+            crown_up(axis)
+            axis.plot(*closed_curve(angle, 0 * angle), color="0.2", lw=0.8)
+            values = [SHOWN[name].scale * state[name].values for _, state in states]
             for k, ((label, _), row) in enumerate(zip(states, values, strict=True)):
                 dashes = {"ls": (0, (4, 2)), "lw": 1.1} if k == 0 else {}
-                axis.plot(*_closed(angle, row), color=colours[k], label=label, **dashes)
-            low, high = min(0.0, *(row.min() for row in values)), max(row.max() for row in values)
-            margin = 0.08 * (high - low)
-            axis.set_ylim(low - margin * (low < 0), high + margin)
-            if low < 0:
-                axis.set_rorigin(low - margin - 0.5 * (high - low))
-            _radial_ticks(axis, None, 4)
-            axis.set_title(title, pad=10)
+                axis.plot(*closed_curve(angle, row), color=colours[k], label=label, **dashes)
+            around_zero(axis, *values)
+            axis.set_title(SHOWN[name].label, pad=10)
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
     return figure
@@ -150,10 +141,12 @@ def extremes_over_inflow(responses):
         for (model, response), style in zip(responses.items(), ("-", "--", ":", "-."), strict=False):
             found = postprocess.extremes(response)
             mass = response["inflow_mass"]
-            for axis, (name, title) in zip(axes, FORCES.items(), strict=True):
-                axis.plot(mass, found[f"{name}_max"] / 1e3, style, color=NOW, label=f"largest, {model}")
-                axis.plot(mass, found[f"{name}_min"] / 1e3, style, color="#c1272d", label=f"smallest, {model}")
-                axis.set_ylabel(title)
+            for axis, name in zip(axes, FORCES, strict=True):
+                axis.plot(mass, SHOWN[name].scale * found[f"{name}_max"], style, color=NOW, label=f"largest, {model}")
+                axis.plot(
+                    mass, SHOWN[name].scale * found[f"{name}_min"], style, color="#c1272d", label=f"smallest, {model}"
+                )
+                axis.set_ylabel(SHOWN[name].label)
                 axis.set_xlabel("inflow mass [kg/m]")
                 axis.grid(True)
         handles, labels = axes[0].get_legend_handles_labels()

@@ -23,7 +23,7 @@ def plans(coarse: bool = False, changes: dict | None = None):
     -------
     list of coupling.studies.design.Study
     """
-    from coupling.scene import load_scene
+    from coupling.scenes.scene import load_scene
     from coupling.studies.design import load_study
 
     fixed = {}
@@ -46,11 +46,11 @@ def run_all(out: str | Path, coarse=False, workers=None, scheduler=None, console
     Returns
     -------
     list of dict
-        Of :func:`coupling.studies.command.run_study`, one a study.
+        Of :func:`coupling.studies.stored.run_study`, one a study.
     """
     from rich.console import Console
 
-    from coupling.studies.command import run_study
+    from coupling.studies.stored import run_study
 
     told = console if console is not None else Console(stderr=True, quiet=True)
     return [run_study(plan, Path(out) / plan.name, workers, scheduler, told) for plan in plans(coarse, changes)]

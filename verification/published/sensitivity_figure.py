@@ -6,7 +6,7 @@ import matplotlib
 import numpy as np
 
 from coupling.figures import NOW, STYLE
-from coupling.picture import Picture
+from coupling.figures.picture import Picture
 from verification.published.sources import at_study_inflow
 
 UNITS = {

@@ -24,6 +24,7 @@ from coupling.datasets import (
     read_pressures,
     read_response,
 )
+from structure.response import FORCES
 from verification.pages import DOCS, made_by, need_docs, provenance
 
 SETTLING = 3.0  # s
@@ -174,7 +175,7 @@ def forces(folder):
             break
         now = response.isel(time=0) if mass == 0 else postprocess.at_inflow(response, mass)
         cells = [f"{mass}"]
-        for name in ("axial_force", "shear_force", "bending_moment"):
+        for name in FORCES:
             for pick in ("max", "min"):
                 index = int(getattr(now[name].values, f"arg{pick}")())
                 cells.append(f"{float(now[name][index]) / 1e3:.0f} ({float(now['theta'][index]):.0f})")

@@ -21,7 +21,7 @@ from scipy.signal import savgol_filter
 import coupling
 import mpm
 from coupling.datasets import cell_centres, cell_mean_weights
-from coupling.run import respond
+from coupling.responses.respond import respond
 from verification.accuracy.orders import extrapolate
 from verification.pages import DOCS, made_by, need_docs
 

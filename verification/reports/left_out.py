@@ -16,7 +16,7 @@ from pathlib import Path
 import coupling
 import mpm
 from coupling.datasets import RunWriter
-from coupling.provenance import root_attributes
+from coupling.files.provenance import root_attributes
 from verification.pages import DOCS, made_by, need_docs
 
 BEGIN, ROUNDS, SPELL = 0.15, 12, 0.015  # simulated seconds after the gate opened, and of a round

@@ -16,15 +16,14 @@ import coupling
 import mpm
 import structure
 from coupling.datasets import cell_centres, cell_mean_weights
-from coupling.provenance import root_attributes
+from coupling.files.provenance import root_attributes
 from structure import theory
+from structure.response import FORCES, PRESSURES
 from verification.pages import DOCS, made_by, need_docs, provenance
 from verification.problems import exact_rings
 
 OTHER_K0 = 0.577  # 1 - sin(phi); the scenes have that of gravity loading
 KINDS = ("fixed", "floating", "elastic")
-PRESSURES = ("soil_pressure", "water_pressure", "soil_shear")
-FORCES = ("axial_force", "shear_force", "bending_moment")
 PLACES = (("crown", 0.0), ("waist opposite", 270.0), ("invert", 180.0))
 PUBLISHED = -267.0  # kN m at the invert before the gate opens: Xie, Zhang & Zhou, text to their Table 3
 PUBLISHED_JOINTS = (-178.0, 147.0)  # joints 1 and 2, their Table 3

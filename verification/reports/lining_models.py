@@ -14,11 +14,12 @@ import xarray as xr
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from coupling.compare import compare
-from coupling.compare_figures import forces_compared, joints_compared
 from coupling.figures import RESOLUTION, STYLE
-from coupling.scene import load_scene
+from coupling.figures.comparison import forces_compared, joints_compared
+from coupling.responses.comparison import compare
+from coupling.scenes.scene import load_scene
 from structure import BeamSpringLining, ContinuumLining, LiningFailure
+from structure.response import FORCES
 from structure.theory import curved_section_moment, theoretical_pressures
 from verification.pages import DOCS, made_by, need_docs
 
@@ -98,7 +99,7 @@ def open_gate(scene):
             continue
         for time, state in ((0, "initial"), (1, "final")):
             cells = []
-            for name in ("axial_force", "shear_force", "bending_moment", "displacement_radial", "joint_rotation"):
+            for name in (*FORCES, "displacement_radial", "joint_rotation"):
                 one, other = whole[name].isel(time=time), hole[name].isel(time=time)
                 cells.append(f"{100 * float(np.abs(other - one).max() / np.abs(one).max()):.1f} %")
             lines.append(f"| {cut:.2f} | {state} | " + " | ".join(cells) + " |")
@@ -124,7 +125,7 @@ def joint_details(scene):
         response, stress = model.respond(loads).isel(time=0), model.stress_field(loads).isel(time=0)
         plain = response if plain is None else plain
         cells = []
-        for name in ("axial_force", "shear_force", "bending_moment", "displacement_radial", "joint_rotation"):
+        for name in (*FORCES, "displacement_radial", "joint_rotation"):
             change = float(np.abs(response[name] - plain[name]).max() / np.abs(plain[name]).max())
             cells.append("-" if response is plain else f"{100 * change:.1f} %")
         near = np.abs(stress["theta"] - scene.ring.joint_angles[1]) < 0.4

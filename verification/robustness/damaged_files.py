@@ -85,10 +85,10 @@ def _kinds(error):
 
 def run_content(path):
     """Everything that the program reads of a run file, as arrays and texts that can be compared."""
+    from coupling.commands.describe import describe
     from coupling.datasets import read_run
-    from coupling.info import describe
-    from coupling.pressure_source import read_source
     from coupling.report.run_page import collect
+    from coupling.responses.source import read_source
 
     content = {}
     for node in read_run(path).subtree:
@@ -105,7 +105,7 @@ def run_content(path):
 
 def checkpoint_content(path):
     """State and notes of a checkpoint."""
-    from coupling.checkpoint import read_checkpoint
+    from coupling.files.checkpoint import read_checkpoint
 
     state, about = read_checkpoint(path)
     return {**{name: np.asarray(value) for name, value in state.items()}, "about": str(about)}
@@ -121,7 +121,7 @@ def journal_content(path):
 
 def scene_content(path):
     """A scene file."""
-    from coupling.scene import load_scene
+    from coupling.scenes.scene import load_scene
 
     return {"source": load_scene(path).source}
 
@@ -133,7 +133,7 @@ def study_content(path):
     return {"cases": str([case.key for case in cases(load_study(str(path)))])}
 
 
-REFUSALS = {"RunFileError", "RunRefused", "SceneError", "StudyError", "CheckpointDamaged"}
+REFUSALS = {"RunFileError", "Refused", "SceneError", "StudyError", "CheckpointDamaged"}
 #: Kind of file to its reader, and whether it guards its content: then other content must never pass unnoticed.
 READERS = {
     "run.nc": (run_content, True),

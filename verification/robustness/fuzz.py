@@ -151,7 +151,7 @@ def simulation_fault(place, text, number):
         return bool(all(np.isfinite(a).all() for a in raw_groups(folder, ("lining", "history"))["lining"].values()))
 
     how, answer = in_a_process(work, 120)
-    if how == "raised" and answer[0] & {"RunFailed", "MeshError", "RunRefused"}:
+    if how == "raised" and answer[0] & {"RunFailed", "MeshError", "Refused"}:
         return ""
     return "" if (how, answer) == ("returned", True) else f"run of scene {number} {how}: {str(answer)[-300:]}"
 
@@ -190,8 +190,8 @@ def good_files(place):
     import h5netcdf
     import numpy as np
 
-    from coupling import checkpoint, journal
     from coupling.datasets import CHECKED_FORMAT
+    from coupling.files import checkpoint, journal
     from verification.small_event import small_scene
     from verification.synthetic_run import write_run
 
@@ -234,19 +234,18 @@ def pressures(place, count, seed):
 
 def rings(place, count, seed):
     """Random rings under random balanced loads by both models: solved by both, or refused by both with a reason."""
-    import re
-
     import numpy as np
 
     from structure import BeamSpringLining, ContinuumLining
-    from verification.robustness.random_rings import SPRINGS, WAYS, outcome, random_balanced_loads, random_ring
+    from verification.robustness.random_rings import SPRINGS, outcome, random_balanced_loads, random_ring, reason
 
+    models = BeamSpringLining, ContinuumLining
     rng, kinds = np.random.default_rng(seed), list(SPRINGS.values())
     verdicts, reasons, faults, differences = Counter(), Counter(), [], []
     for number in range(count):
         ring, loads = random_ring(rng, kinds[number % len(kinds)]), random_balanced_loads(rng)
         try:
-            answers = [outcome(model, ring, loads) for model in (BeamSpringLining, ContinuumLining)]
+            answers = [outcome(model, ring, loads) for model in models]
         except Exception:
             faults.append(f"ring {number}: {traceback.format_exc()[-300:]}")
             continue
@@ -255,12 +254,10 @@ def rings(place, count, seed):
         if sum(refused) == 1:
             faults.append(f"ring {number}: only one model refused: {answers[refused.index(True)]}")
         elif all(refused):
-            for answer in answers:
-                way = re.search(r"degrees\) (turns|slides|opens or closes) most freely", answer)
-                reasons[f"a joint without stiffness {way[1]}" if way else "other"] += 1
-                # the continuum says that joints are too weak and not which
-                without = [name for name in WAYS.values() if getattr(ring, name) == 0]
-                if (WAYS[way[1]] not in without) if way else ("joints" not in answer or not without):
+            for model, answer in zip(models, answers, strict=True):
+                said, holds = reason(model, ring, loads, answer)
+                reasons[said] += 1
+                if not holds:
                     faults.append(f"ring {number}: reason that does not hold: {answer}")
         else:
             thrusts = [answer["axial_force"].mean().item() for answer in answers]

@@ -46,7 +46,7 @@ def main():
 
 def kill_and_resume(place, kills, draw):
     """Kill and resume until `kills` kills have struck a run at work."""
-    from coupling.rerun import compare_bits
+    from coupling.runs.rerun import compare_bits
     from verification.small_event import small_scene
 
     scene = place / "scene.toml"

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 import coupling
-from coupling.scene import load_scene
+from coupling.scenes.scene import load_scene
 from verification.pages import need_docs
 from verification.small_event import COARSE
 

@@ -99,7 +99,9 @@ def _pressures(part):
         f"`uv run python -m verification.robustness.fuzz pressures --count {part['count']} --seed {part['seed']}`. "
         "netCDF files of "
         "random pressures in random units, orders and precisions, each with one mistake or none. The generator knows "
-        "what was meant: a file must give that, be warned of, or be refused with rule, value and remedy.",
+        "what was meant: a file must give that, be warned of, or be refused with rule, value and remedy. "
+        "Untold: eight or nine uneven angles in gon that are called degrees, all within one turn, are as good a file "
+        "in degrees; nobody can know better.",
         "",
         "| mistake | " + " | ".join(kinds) + " |",
         "|---|" + "---|" * len(kinds),
@@ -164,7 +166,7 @@ def _lost_worker(part):
         "## A lost worker",
         "",
         f"`uv run python -m verification.robustness.lost_worker {part['runs']}`. "
-        "A study of {part['runs']} coarse runs on a dask "
+        f"A study of {part['runs']} coarse runs on a dask "
         f"scheduler with two worker processes, of which {part['workers_killed']} was killed in the middle, against the "
         "same study in one process.",
         "",

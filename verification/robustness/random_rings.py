@@ -1,5 +1,7 @@
 """Rings of any joints and springs under random loads in balance, and what a lining model makes of them."""
 
+import re
+
 import numpy as np
 import xarray as xr
 
@@ -20,6 +22,8 @@ SPRINGS = {
 #: How the joint that moves most moves, and the stiffness that it lacks.
 WAYS = {"turns": "joint_rotational_stiffness", "slides": "joint_shear_stiffness",
         "opens or closes": "joint_normal_stiffness"}  # fmt: skip
+#: Stiffness [N/m2, N m/rad/m] of a joint that does not show.
+STIFF = 1e11
 
 
 def random_angles(rng):
@@ -114,3 +118,18 @@ def outcome(model, ring, loads):
         return model(ring).respond(loads).isel(time=0)
     except LiningFailure as refusal:
         return str(refusal)
+
+
+def reason(model, ring, loads, refusal):
+    """What a refusal blames, in a few words, and whether that is so.
+
+    Joints are rightly blamed where they lack the stiffness that the refusal names, or where the ring is solved once
+    they have it. The continuum says that joints are too weak and not which.
+    """
+    way = re.search(rf"degrees\) ({'|'.join(WAYS)}) most freely", refusal)
+    blamed = [WAYS[way[1]]] if way else [*WAYS.values()] if "joints" in refusal else []
+    moves = way[1] if way else "gives way"
+    if any(getattr(ring, name) == 0 for name in blamed):
+        return f"a joint without stiffness {moves}", True
+    stiffer = ring.model_copy(update=dict.fromkeys(blamed, STIFF))
+    return f"a soft joint {moves}", bool(blamed) and not isinstance(outcome(model, stiffer, loads), str)

@@ -6,9 +6,10 @@ import re
 import time
 
 import coupling
-from coupling.plan import rough_plan
-from coupling.plausibility import warnings_of
-from coupling.run_folder import RunRefused, default_folder
+from coupling.files.folder import default_folder
+from coupling.refused import Refused
+from coupling.runs.plan import rough_plan
+from coupling.scenes.plausibility import warnings_of
 
 #: Longest that judging a scene may take [s]; usual are some milliseconds.
 PATIENCE = 5.0
@@ -173,7 +174,7 @@ def judged(load, origin, in_file):
         scene = load()
         told = warnings_of(scene)
         data = rough_plan(scene, warn=lambda message: None)
-    except (coupling.SceneError, RunRefused) as refusal:
+    except (coupling.SceneError, Refused) as refusal:
         message = str(refusal)
         check_refusal(message, origin, in_file)
         verdict = "refused", message
@@ -182,7 +183,7 @@ def judged(load, origin, in_file):
         assert 0 < data["dt"] < 1e9 and data["points"] > 0, data
         folder = default_folder(scene.name)
         assert folder.parent.name == "runs" and folder.name not in (".", ".."), folder
-        assert coupling.scene.parse_scene(scene.source, "again") == scene, "the stored text is another scene"
+        assert coupling.scenes.scene.parse_scene(scene.source, "again") == scene, "the stored text is another scene"
         assert len(told) == len(set(told))
         verdict = ("warned" if told else "planned"), "\n".join(told)
     assert time.monotonic() - begin < PATIENCE, "too slow"

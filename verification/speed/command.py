@@ -8,6 +8,7 @@ from verification.speed.layout import bytes_per_point_step, operations_per_point
 from verification.speed.reference import ReferenceLoop, copy_bandwidth
 from verification.speed.sizes import LARGEST, SIZES, size_ladder, slope
 from verification.speed.stepping import SECONDS_OF_WARM_UP, configurations, kernel_times, prepared, rate, timed
+from verification.speed.studies import study_seconds
 
 ROUNDS, SECONDS = 3, 1.0
 FEW_SECONDS = 0.3
@@ -37,7 +38,7 @@ def bench(scene, step_only=False, large=False, tell=lambda line: None, rounds=RO
         copy_bytes_per_second; bytes_per_point: memory of the solver; bytes_per_point_step, operations_per_point_step:
         counted; roofline_points_per_second: copy over bytes; kernels: name to processor seconds per point-step; load:
         mean number of running programs before and after. Unless `step_only` also configurations, threads, sizes,
-        size_slope, imports [s], start [s], first_step_wall_seconds, throughput.
+        size_slope, imports [s], start [s], first_step_wall_seconds, throughput, study (`studies.study_seconds`).
     """
     import mpm
 
@@ -65,6 +66,7 @@ def bench(scene, step_only=False, large=False, tell=lambda line: None, rounds=RO
         data["first_step_wall_seconds"] = processes.first_step_wall_seconds()
         tell("runs at once")
         data["throughput"] = _throughput()
+        data["study"] = study_seconds()
     data["load"] = [*load, os.getloadavg()[0]]
     data["cpu_seconds"] = sum(os.times()[:4])
     return data

@@ -15,7 +15,7 @@ IMPORTS = {
 START = """
 import time
 def used(): return time.process_time()
-from coupling.scene import load_scene
+from coupling.scenes.scene import load_scene
 scene = load_scene("quick").mpm
 loaded = used()
 import mpm
@@ -36,7 +36,7 @@ EVENT = """
 import sys, time
 import mpm
 from verification.speed.stepping import steps
-from coupling.scene import load_scene
+from coupling.scenes.scene import load_scene
 scene = load_scene("quick").mpm
 solver = mpm.Solver(scene, mpm.build_mesh(scene), threads=1)
 solver.open_gate()

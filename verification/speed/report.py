@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from verification.pages import made_by, provenance
+from verification.speed import studies
 
 
 def dataset(data):
@@ -44,7 +45,7 @@ def figure(data):
     import matplotlib
 
     from coupling.figures import GATE, NOW, STYLE
-    from coupling.picture import Picture
+    from coupling.figures.picture import Picture
 
     with matplotlib.rc_context(STYLE):
         drawn = Picture(figsize=(7.2, 5.6), layout="constrained")
@@ -173,5 +174,7 @@ def page(data):
         f"{share['runs']} independent runs of one thread each: {share['share_of_ideal']:.2f} of {share['runs']} times "
         f"the throughput of one by the clock; each had {share['processor_share_of_each']:.2f} of a processor, the one "
         f"alone {share['processor_share_of_one']:.2f}.",
+        "",
+        *studies.section(data["study"]),
     ]
     return "\n".join(lines) + "\n"

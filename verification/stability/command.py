@@ -1,6 +1,6 @@
 """What `gush stability` does: the linear map, the extremes, their files and tables."""
 
-from coupling.scene import SceneError
+from coupling.refused import SceneError
 from verification.stability.cases import cases
 from verification.stability.extremes import BUG, judge_apart
 from verification.stability.linear import critical_map

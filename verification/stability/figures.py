@@ -4,7 +4,7 @@ import matplotlib
 import numpy as np
 
 from coupling.figures import GATE, NOW, SECOND, STYLE
-from coupling.picture import Picture
+from coupling.figures.picture import Picture
 
 PLACES = ("layout", "random", "edges", "vertices")
 SETS = (("spectral", True, NOW), ("spectral", False, "0.45"), ("altitude", True, SECOND), ("altitude", False, GATE))

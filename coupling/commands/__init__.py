@@ -1,0 +1,1 @@
+"""The commands of `gush`, one file each. Heavy libraries load inside them."""

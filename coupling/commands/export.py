@@ -1,0 +1,26 @@
+"""The command `gush export`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from coupling.commands.exit_codes import JsonPath, checked_json, failures, tell_files
+from coupling.commands.options import Run
+
+
+def export_command(
+    run: Run,
+    kind: Annotated[str, typer.Option("--format", help="vtu or xdmf for ParaView, gif for an animation.")] = "vtu",
+    out: Annotated[Path | None, typer.Option(help="Folder; fields in the run's folder when left out.")] = None,
+    json_path: JsonPath = None,
+):
+    """Write points and mesh of a run over time as files for ParaView, or as an animation.
+
+    JSON: `run`, `format`, `files` (paths to open).
+    """
+    with failures(), checked_json(json_path):
+        from coupling.export import export
+
+        files = export(run, kind, out)
+        tell_files({"run": str(run), "format": kind, "files": [str(path) for path in files]}, json_path, files)

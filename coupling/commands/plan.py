@@ -1,0 +1,74 @@
+"""The command `gush plan`."""
+
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from coupling.commands.exit_codes import JsonPath, checked_json, failures, warn, write_json
+from coupling.commands.options import Changes, SceneName, Threads
+from coupling.runs.progress_line import duration
+
+
+def plan_command(
+    scene: SceneName,
+    changes: Changes = None,
+    threads: Threads = None,
+    rough: Annotated[bool, typer.Option("--rough", help="From formulas alone, without building the mesh.")] = False,
+    json_path: JsonPath = None,
+):
+    """What a run would do and cost: active parts, points, time step, steps, memory, time.
+
+    JSON: keys of `coupling.runs.plan.plan`, with --rough of `coupling.runs.plan.rough_plan`; and `warnings`.
+    """
+    with failures(), checked_json(json_path):
+        from coupling.runs.plan import plan, rough_plan
+        from coupling.scenes.layers import parse_changes
+        from coupling.scenes.scene import load_scene
+
+        loaded, told = load_scene(scene, **parse_changes(changes or [])), []
+
+        def tell(message):
+            told.append(message)
+            warn(message)
+
+        data = {**(rough_plan if rough else plan)(loaded, threads, tell), "warnings": told}
+        write_json(json_path, data)
+        if str(json_path) != "-":
+            console = Console()
+            console.print(_feature_table(data))
+            console.print(_cost_table(data))
+
+
+def _feature_table(data):
+    table = Table("part", "", "why", title=f"{data['scene']}: what is computed")
+    for row in data["features"]:
+        table.add_row(row["feature"], "active" if row["active"] else "left out", row["reason"])
+    return table
+
+
+def _cost_table(data):
+    most = data["steps_to_stop_time"]
+    most = "no stop time given" if most is None else f"{most} until the stop time"
+    table = Table("cost", "", title=f"{data['scene']}: what it costs")
+    free = data["free_memory_bytes"]
+    meshed = "nodes" in data
+    if meshed:
+        table.add_row("elements, nodes, points", f"{data['elements']}, {data['nodes']}, {data['points']}")
+        table.add_row("flattest triangle, smallest angle", f"{data['min_altitude']:.3f} m, {data['min_angle']:.0f} deg")
+        table.add_row("time step", f"{1e6 * data['dt']:.0f} µs ({data['dt_limit']})")
+    else:
+        table.add_row("elements, points", f"some {data['elements']}, {data['points']}")
+        table.add_row("time step", f"some {1e6 * data['dt']:.2g} µs")
+    for row in (
+        ("simulated time", f"about {data['expected_time']:.2g} s (a guess where an inflow mass ends the run)"),
+        ("steps", f"about {data['expected_steps']}, {most}"),
+        ("records", f"about {data['records']}"),
+        ("memory", f"{data['memory_bytes'] / 1e6:.0f} MB" + (f" of {free / 1e9:.1f} GB free" if free else "")),
+    ):
+        table.add_row(*row)
+    if meshed:
+        table.add_row("speed measured now", f"{data['point_steps_per_second'] / 1e6:.1f} M point-steps/s")
+        table.add_row("time of stepping", f"about {duration(data['expected_seconds'])}")
+    return table

@@ -1,0 +1,36 @@
+"""The command `gush report`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from coupling.commands.exit_codes import JsonPath, checked_json, failures, tell_files
+
+
+def report_command(
+    path: Annotated[Path, typer.Argument(help="Folder of a run (or its run.nc) or of a study, also one that goes on.")],
+    out: Annotated[Path | None, typer.Option(help="The HTML file; report.html in the folder when left out.")] = None,
+    model: Annotated[
+        str | None, typer.Option(help="Lining model whose numbers lead; the run's own when left out.")
+    ] = None,
+    runs: Annotated[bool, typer.Option("--runs", help="Of a study: also write the page of every run.")] = False,
+    json_path: JsonPath = None,
+):
+    """Write one HTML page about a run or a study: key numbers, charts with one slider, balances. Opens offline.
+
+    JSON: `run` or `study` (path), `report` (path), `bytes`; `runs` (paths) with --runs.
+    """
+    with failures(), checked_json(json_path):
+        from coupling.refused import Refused
+        from coupling.report.page import study_folder, write_report, write_run_reports
+
+        folder = study_folder(path)
+        if runs and folder is None:
+            raise Refused(f"--runs: '{path}' must be a study, it is a run; leave --runs out")
+        of_runs = write_run_reports(folder) if runs else []
+        page = write_report(path, out, model)
+        data = {"run" if folder is None else "study": str(path), "report": str(page), "bytes": page.stat().st_size}
+        if runs:
+            data["runs"] = [str(file) for file in of_runs]
+        tell_files(data, json_path, [*of_runs, page])

@@ -1,0 +1,94 @@
+"""The command `gush respond`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from coupling.commands.exit_codes import JsonPath, checked_json, failures, told_warnings, write_json
+from coupling.commands.options import SOURCE, RingScene
+from coupling.commands.tables import response_table
+
+
+def draw_checks(checked, file, model, own_file=None, tunnel=None):
+    """Draw the checks beside a run's figures, or beside the response's own file and named after it; returns the path.
+
+    file : path, of the run;  own_file : path or None, from :func:`coupling.responses.stored.chosen_file`;  tunnel : int
+    or None, of those without the gate.
+    """
+    from coupling.figures import RESOLUTION
+    from coupling.figures.utilisations import checks
+    from coupling.files.folder import FIGURES
+
+    folder = file.parent / FIGURES
+    path = (folder if folder.is_dir() else file.parent) / (
+        f"checks-{model}{'' if tunnel is None else f'-tunnel-{tunnel}'}.png"
+    )
+    if own_file is not None:
+        path = own_file.with_name(f"{own_file.stem}-checks.png")
+    checks(checked).savefig(path, dpi=RESOLUTION)
+    return str(path)
+
+
+def respond_command(
+    run: Annotated[Path, typer.Argument(help=SOURCE)],
+    backend: Annotated[
+        str, typer.Option(help="Lining model: beam-spring, continuum, an installed one, or yours as FILE.py:CLASS.")
+    ] = "beam-spring",
+    scene: RingScene = None,
+    limits: Annotated[
+        Path | None, typer.Option(help="TOML file of structure.Limits: checks the response and draws its utilisations.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="File for the response; when left out RUN itself, beside it where RUN is none.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file of an earlier response.")] = False,
+    json_path: JsonPath = None,
+):
+    """Compute the ring's response to the pressures of a run, and store it with them as /structure/BACKEND.
+
+    The response of another ring (--scene), or to pressures that are no run, goes into a file of its own beside them:
+    FILE-BACKEND.nc.
+
+    JSON: keys of `coupling.postprocess.summary.summarise_response`, and `run`, `backend`, `file` (path of the
+    response); with --limits `utilisations` (largest of every check, 1 is its limit) and `figure` (path). Of several
+    tunnels these are of that with the gate, `tunnels` has the same of the others.
+    """
+    with failures(), checked_json(json_path), told_warnings():
+        from coupling.commands.respond import draw_checks
+        from coupling.postprocess.summary import summarise_response
+        from coupling.responses.limits import read_limits, with_checks
+        from coupling.responses.respond import respond_by_name
+        from coupling.responses.source import read_sources
+        from coupling.responses.stored import chosen_file, store_response
+
+        sources = read_sources(run, scene)
+        given = None if limits is None else read_limits(limits)
+        name = backend.rpartition(":")[2]
+        targets = [chosen_file(source, name, out, overwrite) for source in sources]
+        answers = []
+        for source, target in zip(sources, targets, strict=True):
+            response = respond_by_name(source.ring, source.pressures, backend)
+            answer = summarise_response(response)
+            if given is not None:
+                response, answer["utilisations"] = with_checks(response, given)
+            answer["file"] = str(store_response(response, source, name, target))
+            if given is not None:
+                answer["figure"] = draw_checks(response, source.file, name, target, source.tunnel)
+            answers.append(answer)
+        data = {"run": str(run), "backend": name, **answers[0]}
+        if len(sources) > 1:
+            data["tunnels"] = {source.tunnel: answer for source, answer in zip(sources[1:], answers[1:], strict=True)}
+        write_json(json_path, data)
+        if str(json_path) != "-":
+            console = Console()
+            for source, answer in zip(sources, answers, strict=True):
+                console.print(response_table(answer, source.tunnel))
+                if given is not None:
+                    shares = ", ".join(
+                        f"{check.replace('_', ' ')} {share:.2f}" for check, share in answer["utilisations"].items()
+                    )
+                    console.print(f"largest of its limit: {shares}", highlight=False)
+                    console.print(f"picture in {answer['figure']}", highlight=False, soft_wrap=True)
+                console.print(f"response in {answer['file']}", highlight=False, soft_wrap=True)

@@ -1,0 +1,64 @@
+"""The command `gush study`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from coupling.commands.exit_codes import FAILED, JsonPath, checked_json, failures, write_json
+from structure.response import SHOWN
+
+
+def study_command(
+    study: Annotated[
+        str,
+        typer.Argument(
+            help="A built-in study (table-2, sensitivity, permeability, mesh, backend), a TOML file, or the folder "
+            "of a study that is to go on."
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder; that which goes on, or studies/NAME, when left out. What is there is not rerun."),
+    ] = None,
+    workers: Annotated[int | None, typer.Option(min=0, help="Processes; all cores when left out, 0: this one.")] = None,
+    scheduler: Annotated[str | None, typer.Option(help="Address of a running dask scheduler to use instead.")] = None,
+    json_path: JsonPath = None,
+):
+    """Run many scenes that differ in some parameters, in parallel; one dataset of them all. Rerun to resume.
+
+    JSON: keys of `coupling.studies.stored.run_study`.
+    """
+    with failures(), checked_json(json_path):
+        from coupling.studies.stored import run_study
+
+        data = run_study(study, out, workers, scheduler, Console(stderr=True))
+        write_json(json_path, data)
+        if str(json_path) != "-":
+            console = Console()
+            console.print(_study_table(data))
+            console.print(f"data: {data['data']}", highlight=False, soft_wrap=True)
+        if any(case["status"] == "failed" for case in data["cases"]):
+            raise typer.Exit(FAILED)
+
+
+def _study_table(data):
+    table = Table(title=f"{data['study']}{', ' + data['model'] if data['model'] else ''}")
+    table.add_column("case", min_width=min(22, max(len(case["name"]) for case in data["cases"])))
+    axial, bending = SHOWN["axial_force"], SHOWN["bending_moment"]
+    for head in ("kg/m", "after s", f"N max {axial.unit}", f"M {bending.unit}", "CPU s"):
+        table.add_column(head, no_wrap=True)
+    table.add_column("status")
+    for case in data["cases"]:
+        cells = [""] * 5
+        if case["status"] == "finished":
+            force, moment = case["axial_force"], case["bending_moment"]
+            cells = [f"{case['inflow_mass']:.4g}", f"{case['time']:.3g}"]
+            cells += [f"{axial.scale * force['max']:.0f}" if force else "-"]
+            ends = (f"{bending.scale * moment[end]:.0f}" for end in ("min", "max")) if moment else ()
+            cells += [" to ".join(ends) or "-"]
+            cells += [f"{case['cpu_seconds']:.1f}"]
+        table.add_row(case["name"], *cells, case["message"] or case["status"])
+    return table

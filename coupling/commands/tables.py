@@ -1,0 +1,24 @@
+"""Tables that several commands show."""
+
+from rich.table import Table
+
+from structure.response import FORCES, SHOWN
+
+
+def response_table(data, tunnel=None):
+    """Extremes of the ring's forces, and its joints; `data` as of `summarise_response`."""
+    table = Table("ring" if tunnel is None else f"ring of tunnel {tunnel}", "initial", "final")
+    for name in FORCES:
+        for extreme in ("max", "min"):
+            cells = (
+                f"{SHOWN[name].scale * data[name][state][extreme]:.0f} at "
+                f"{data[name][state][f'{extreme}_theta'] % 360:.4g} deg"
+                for state in ("initial", "final")
+            )
+            table.add_row(f"{SHOWN[name].short} {extreme} \\[{SHOWN[name].unit}]", *cells)
+    for name in ("joint_opening", "joint_rotation"):
+        if data[name]["final"]:
+            scale = SHOWN[name].scale
+            cells = (" ".join(f"{scale * value:.2f}" for value in data[name][state]) for state in ("initial", "final"))
+            table.add_row(SHOWN[name].label.replace("[", "\\["), *cells)
+    return table

@@ -1,0 +1,284 @@
+"""The writer that appends to a run file while the run goes on."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import math
+import time as clock
+from pathlib import Path
+
+import numpy as np
+
+from coupling.datasets.additions import CHECKED_FORMAT, append_to
+from coupling.datasets.geometry import geometry_attributes
+from coupling.datasets.open_run import OpenRun
+from coupling.datasets.schema import (
+    BALANCES,
+    DT_LIMITS,
+    ERRORS,
+    HISTORY,
+    INFLOW,
+    INTEGERS,
+    MOTION,
+    POINTS,
+    PRESSURES,
+    PROGRESS,
+    RING_FORCES,
+)
+from coupling.datasets.theta_grid import cell_bounds, cell_centres, cell_mean_weights
+from coupling.files.replace import replace_file
+
+SECONDS_BETWEEN_WRITES = 1.0
+
+
+class RunWriter:
+    """Appends records to a run file that any reader can open at any moment, also after a kill.
+
+    Each batch opens the file, grows the dimensions, writes the data, the times last, and closes it; it reaches the
+    file as a whole or not at all (see `coupling.files.journal`).
+
+    Parameters
+    ----------
+    path : str or path
+        Written anew.
+    attributes : dict
+        Root attributes, from :func:`coupling.files.provenance.root_attributes`.
+    scene : mpm.scene.Scene
+        For the geometry that figures need.
+    mesh : mpm.mesh.Mesh or None
+        Stored in `/mesh` when given.
+    """
+
+    def __init__(self, path, attributes, scene, mesh=None):
+        self._start(path, scene, 0, 0)
+        self._create(attributes, geometry_attributes(scene), mesh)
+
+    @classmethod
+    def continued(cls, path, scene, records, snapshots, **attributes):
+        """Writer for a file that holds at least so many records and snapshots; what follows is written over.
+
+        Parameters
+        ----------
+        path, scene
+            As of the class.
+        records, snapshots : int
+            Rows that are kept; rows behind them stay until they are written again.
+        **attributes
+            Root attributes to set.
+        """
+        writer = cls.__new__(cls)
+        writer._start(path, scene, records, snapshots)
+        writer.attributes = {"status": "running", "status_message": "", **attributes}
+        return writer
+
+    def _start(self, path, scene, records, snapshots):
+        self.path = Path(path)
+        self._waiting, self._last_write = [], -math.inf
+        self._weights = {}
+        self.attributes = {}  # of the root, written with the next batch
+        self._count, self._snapshots = records, snapshots
+        self._n_tunnels = len(scene.tunnels)
+        kinds = {scene.lining_of(tunnel) for tunnel in scene.tunnels}
+        self._on_theta = PRESSURES | (MOTION if kinds - {"fixed"} else {}) | (RING_FORCES if "elastic" in kinds else {})
+
+    @property
+    def written(self):
+        """Records and snapshots that are in the file for good."""
+        return {"records": self._count, "snapshots": self._snapshots}
+
+    def append(self, record):
+        """Take one `mpm.Record`; it reaches the file at once or with the next batch, within about a second."""
+        self._waiting.append(record)
+        if clock.monotonic() - self._last_write >= SECONDS_BETWEEN_WRITES:
+            self.flush()
+
+    def flush(self):
+        """Write what waits."""
+        if self._waiting:
+            with self._written_batch():
+                pass
+
+    def close(self, status, message="", judged=None, **attributes):
+        """Write what waits and how the run ended, and return the pressures on the lining.
+
+        Parameters
+        ----------
+        status : {"finished", "failed", "interrupted"}
+        message : str
+        judged : callable, optional
+            Takes the whole `/history` and gives more attributes.
+        **attributes
+            Root attributes to set.
+        """
+        with self._written_batch() as (file, content):
+            run = OpenRun(self.path, content)
+            if judged is not None:
+                attributes |= judged(run.group("history"))
+            file.attrs.update({"status": status, "status_message": message, **attributes})
+            return run.group("lining")
+
+    @contextlib.contextmanager
+    def _written_batch(self):
+        """Write what waits, and attributes that wait, with what else the block writes."""
+        batch = list(self._waiting)
+        snapshots = [record for record in batch if record.points is not None]
+        with append_to(self.path) as (file, content):
+            file.attrs.update(self.attributes)
+            if snapshots:
+                self._write_points(file["points"], snapshots)
+            if batch:
+                self._write_lining(file["lining"], batch)
+                self._write_history(file["history"], batch)
+            yield file, content
+        # only now: a write that Ctrl-C cut short is repeated in the same rows
+        del self._waiting[: len(batch)]
+        self.attributes = {}
+        self._count += len(batch)
+        self._snapshots += len(snapshots)
+        self._last_write = clock.monotonic()
+
+    def _create(self, attributes, geometry, mesh):
+        import h5netcdf
+
+        image = io.BytesIO()
+        with h5netcdf.File(image, "w", libver=CHECKED_FORMAT) as file:
+            for name, value in {**attributes, "status": "running", "status_message": ""}.items():
+                file.attrs[name] = value
+            space = ("tunnel", "theta") if self._n_tunnels > 1 else ("theta",)
+            lining = self._create_group(file, "lining", geometry)
+            if self._n_tunnels > 0:
+                lining.dimensions.update({"theta": 360, "bounds": 2})
+                lining.attrs["coordinates"] = "theta_bnds"
+                if self._n_tunnels > 1:
+                    lining.dimensions["tunnel"] = self._n_tunnels
+                    _variable(lining, "tunnel", ("tunnel",), "i4", ("1", "tunnel, counted from 0"))[:] = np.arange(
+                        self._n_tunnels
+                    )
+                theta = _variable(lining, "theta", ("theta",), "f8", ("degree", "angle from the crown, clockwise"))
+                theta[:] = cell_centres()
+                theta.attrs["bounds"] = "theta_bnds"
+                lining.create_variable("theta_bnds", ("theta", "bounds"), "f8", fletcher32=True)[:] = cell_bounds()
+                shape = (16, *([self._n_tunnels] if self._n_tunnels > 1 else []), 360)
+                for name, meaning in self._on_theta.items():
+                    variable = _variable(lining, name, ("time", *space), "f8", meaning, shape)
+                    when = "mean" if name in PRESSURES else "point"
+                    variable.attrs["cell_methods"] = f"time: {when} theta: mean"
+            for name, meaning in PROGRESS.items():
+                _variable(lining, name, ("time",), "f8", meaning, (256,))
+            history = self._create_group(file, "history", {})
+            for name, meaning in HISTORY.items():
+                kind = "i8" if name in INTEGERS else "i1" if name == "dt_limit" else "f8"
+                _variable(history, name, ("time",), kind, meaning, (256,))
+            history["dt_limit"].attrs["flag_values"] = np.arange(len(DT_LIMITS), dtype="i1")
+            history["dt_limit"].attrs["flag_meanings"] = " ".join(DT_LIMITS)
+            for group in (lining, history):
+                for variable in group.variables.values():
+                    if variable.dimensions[0] == "time" and variable.name.rpartition("/")[2] not in ("time", INFLOW):
+                        variable.attrs["coordinates"] = INFLOW
+            points = self._create_group(file, "points", geometry)
+            points.attrs["comment"] = "values of one time are in no particular order; padded with NaN"
+            if mesh is not None:
+                _write_mesh(file.create_group("mesh"), mesh, geometry)
+        replace_file(self.path, image.getbuffer())
+
+    @staticmethod
+    def _create_group(file, name, attributes):
+        group = file.create_group(name)
+        for key, value in attributes.items():
+            group.attrs[key] = value
+        group.dimensions["time"] = None
+        time = _variable(group, "time", ("time",), "f8", ("s", "time since the gate opened"), (256,), fill=np.nan)
+        del time.attrs["_FillValue"]  # CF knows no missing coordinates: rows without a time are not there yet
+        return group
+
+    def _write_lining(self, group, batch):
+        rows = slice(self._count, self._count + len(batch))
+        _grow_to(group, rows.stop)
+        for name in self._on_theta if self._n_tunnels else ():
+            values = np.array([[self._resample(t, part, name) for t, part in enumerate(r.lining)] for r in batch])
+            group[name][rows] = values if self._n_tunnels > 1 else values[:, 0]
+        for name in PROGRESS:
+            group[name][rows] = [getattr(record, name) for record in batch]
+        group["time"][rows] = [record.time for record in batch]
+
+    def _resample(self, tunnel, part, name):
+        if tunnel not in self._weights:
+            self._weights[tunnel] = cell_mean_weights(part["theta"])
+        if name not in part:  # of a lining that is not elastic, beside one that is
+            return np.full(360, np.nan)
+        return self._weights[tunnel] @ part[name]
+
+    def _write_history(self, group, batch):
+        rows = slice(self._count, self._count + len(batch))
+        _grow_to(group, rows.stop)
+        for name in HISTORY:
+            if name.startswith("clamp_"):
+                values = [record.clamp_counts.get(name.removeprefix("clamp_"), 0) for record in batch]
+            elif name in BALANCES:
+                values = [record.balances[name] for record in batch]
+            elif name in ERRORS:
+                values = [record.errors[name] for record in batch]
+            elif name == "dt_limit":
+                values = [_limit_flag(record.dt_limit) for record in batch]
+            else:
+                values = [getattr(record, name) for record in batch]
+            group[name][rows] = np.array(values)
+        group["time"][rows] = [record.time for record in batch]
+
+    def _write_points(self, group, snapshots):
+        most = max(len(record.points["x"]) for record in snapshots)
+        if "point" not in group.dimensions:
+            group.dimensions["point"] = None
+            for name, meaning in POINTS.items():
+                if name in snapshots[0].points:
+                    _variable(group, name, ("time", "point"), "f4", meaning, (1, most), fill=np.nan, compress=True)
+        group.resize_dimension("point", max(most, group.dimensions["point"].size))
+        rows = slice(self._snapshots, self._snapshots + len(snapshots))
+        _grow_to(group, rows.stop)
+        for k, record in enumerate(snapshots, start=self._snapshots):
+            present = ~record.points.get("removed", np.zeros(len(record.points["x"]), bool))
+            for name in POINTS:
+                if name in group.variables and name in record.points:
+                    values = np.asarray(record.points[name])[present]
+                    group[name][k, : len(values)] = values.astype("f4")
+        group["time"][rows] = [record.time for record in snapshots]
+
+
+def _write_mesh(group, mesh, geometry):
+    for key, value in geometry.items():
+        group.attrs[key] = value
+    group.attrs["Conventions"], group.attrs["coordinates"] = "CF-1.11 UGRID-1.0", "x y"
+    group.dimensions.update({"node": len(mesh.nodes), "element": len(mesh.elements), "corner": 3})
+    topology = group.create_variable("topology", (), "i4")
+    topology.attrs.update({
+        "cf_role": "mesh_topology", "long_name": "triangles of the mesh", "topology_dimension": np.int32(2),
+        "node_coordinates": "x y", "face_node_connectivity": "element_nodes", "face_dimension": "element",
+    })  # fmt: skip
+    for axis, name, k in (("horizontal", "x", 0), ("vertical", "y", 1)):
+        node = _variable(group, name, ("node",), "f8", ("m", f"{axis} position of the node"))
+        node[:] = mesh.nodes[:, k]
+    corners = _variable(group, "element_nodes", ("element", "corner"), "i4", ("1", "nodes, counter-clockwise, from 0"))
+    corners[:] = mesh.elements
+    corners.attrs["cf_role"], corners.attrs["start_index"] = "face_node_connectivity", np.int32(0)
+    region = _variable(group, "region", ("element",), "i1", ("1", "part of the mesh"))
+    region[:] = mesh.region
+    region.attrs["mesh"], region.attrs["location"] = "topology", "face"
+    region.attrs["flag_values"] = np.arange(4, dtype="i1")
+    region.attrs["flag_meanings"] = "soil channel interior headroom"
+
+
+def _variable(group, name, dimensions, kind, meaning, chunks=None, fill=None, compress=False):
+    options = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if compress else {}
+    variable = group.create_variable(name, dimensions, kind, chunks=chunks, fillvalue=fill, fletcher32=True, **options)
+    variable.attrs["units"], variable.attrs["long_name"] = meaning
+    return variable
+
+
+def _grow_to(group, rows):
+    # never shrinks: a continued run may find records that it is about to compute again
+    group.resize_dimension("time", max(rows, group.dimensions["time"].size))
+
+
+def _limit_flag(name):
+    return DT_LIMITS.index(name) if name in DT_LIMITS else len(DT_LIMITS) - 1

@@ -1,0 +1,108 @@
+"""Points and mesh of a run over time as files for ParaView and PyVista, and as an animation."""
+
+from __future__ import annotations
+
+import contextlib
+import fnmatch
+from pathlib import Path
+
+from coupling.datasets import RunFileError, opened, read_mesh, read_points, read_run
+from coupling.export.animation import animation
+from coupling.export.grids import mesh_grids, point_grid, ring_series
+from coupling.files.folder import FIELDS
+from coupling.refused import Refused
+
+#: Format: names of the files it writes, replaced by the next export into the same folder.
+FILES = {
+    "vtu": tuple(f"{stem}{end}" for stem in ("points", "mesh", "lining", "ring_*") for end in ("_*.vtu", ".pvd")),
+    "xdmf": tuple(f"{stem}{end}" for stem in ("points", "mesh", "lining", "ring_*") for end in (".xdmf", ".h5")),
+    "gif": ("gushing.gif",),
+}
+
+
+def export(run: str | Path, kind: str, out: str | Path | None = None) -> list[Path]:
+    """Write the fields of a run.
+
+    Parameters
+    ----------
+    run : str or path
+        Run folder or file with snapshots of the points.
+    kind : {"vtu", "xdmf", "gif"}
+        "vtu": a file a time and `.pvd` series; "xdmf": series with their HDF5 files; "gif": an animation. A series each
+        of the points, of the mesh, of the pressures on the lining, and of the forces of every lining model.
+    out : str or path, optional
+        Folder; `fields` in the run's folder when left out. Files of an earlier export are replaced, nothing else.
+
+    Returns
+    -------
+    list of pathlib.Path
+        Files to open.
+
+    Raises
+    ------
+    RunFileError
+        No run, or no snapshots.
+    Refused
+        An unknown format, or a folder with other files.
+    """
+    if kind not in FILES:
+        raise Refused(f"export: format must be one of {', '.join(FILES)}, got '{kind}'")
+    with opened(run) as file:
+        return _exported(file, kind, out)
+
+
+def _exported(file, kind, out):
+    points = read_points(file)
+    if "x" not in points or not points.sizes.get("time"):
+        raise RunFileError(
+            f"run file '{file.path}': holds no snapshot of the points, nothing can be exported; did the "
+            "scene say output.points = false, or is the run at its beginning?"
+        )
+    folder = _prepared(file.path.parent / FIELDS if out is None else Path(out), kind)
+    if kind == "gif":
+        return [animation(points, folder / "gushing.gif")]
+    write = _write_vtu if kind == "vtu" else _write_xdmf
+    times, shots = points["time"].values, [points.isel(time=k) for k in range(points.sizes["time"])]
+    written = [write(folder / "points", times, (point_grid(shot) for shot in shots))]
+    with contextlib.suppress(RunFileError):  # a run without a stored mesh
+        written.append(write(folder / "mesh", times, mesh_grids(shots, read_mesh(file))))
+    for stem, at, grids in ring_series(read_run(file), times):
+        written.append(write(folder / stem, at, grids))
+    return written
+
+
+def _write_vtu(stem, times, grids):
+    lines = ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">', "<Collection>"]
+    for k, (time, grid) in enumerate(zip(times, grids, strict=True)):
+        path = stem.with_name(f"{stem.name}_{k:04d}.vtu")
+        grid.write(path)
+        lines.append(f'<DataSet timestep="{float(time)!r}" part="0" file="{path.name}"/>')
+    series = stem.with_suffix(".pvd")
+    series.write_text("\n".join([*lines, "</Collection>", "</VTKFile>", ""]), encoding="utf-8")
+    return series
+
+
+def _write_xdmf(stem, times, grids):
+    from coupling.export.xdmf import XdmfSeries
+
+    path = stem.with_suffix(".xdmf")
+    with XdmfSeries(path) as series:
+        for time, grid in zip(times, grids, strict=True):
+            series.append(time, grid)
+    return path
+
+
+def _prepared(folder, kind):
+    """The folder, made or emptied of an earlier export of that format."""
+    known = [pattern for patterns in FILES.values() for pattern in patterns]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise Refused(f"export folder '{folder}': it, or one above it, is a file; choose another --out") from None
+    strange = [p.name for p in folder.iterdir() if not any(fnmatch.fnmatch(p.name, known_) for known_ in known)]
+    if strange:
+        raise Refused(f"export folder '{folder}': holds other files ({strange[0]}); choose another --out")
+    for pattern in FILES[kind]:
+        for earlier in folder.glob(pattern):
+            earlier.unlink()
+    return folder

@@ -1,0 +1,32 @@
+"""How pictures look, and the figure that they are drawn on."""
+
+import io
+
+from matplotlib.figure import Figure
+
+STYLE = {
+    "font.size": 8,
+    "axes.titlesize": 8.5,
+    "axes.labelsize": 8,
+    "axes.linewidth": 0.6,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "legend.fontsize": 7.5,
+    "legend.frameon": False,
+    "grid.linewidth": 0.4,
+    "grid.color": "0.85",
+    "lines.linewidth": 1.4,
+    "figure.dpi": 100,
+}
+RESOLUTION = 200  # dots per inch of saved pictures
+INITIAL, NOW, GATE, SECOND = "0.45", "#0b5394", "#c1272d", "#d98200"
+CONCRETE = "0.82"
+
+
+class Picture(Figure):
+    """A matplotlib figure outside of pyplot: nothing global knows it, so only Jupyter's display of a value shows it."""
+
+    def _repr_png_(self):
+        image = io.BytesIO()
+        self.savefig(image, format="png")
+        return image.getvalue()

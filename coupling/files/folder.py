@@ -1,0 +1,162 @@
+"""The folder of a run: chosen, checked and locked before anything starts, so that nothing existing is lost."""
+
+import contextlib
+import fcntl
+import os
+import shlex
+import time as clock
+from pathlib import Path
+
+from coupling.files.checkpoint import remove_checkpoints
+from coupling.refused import Refused
+
+RUN_FILE, MESH_FILE, SCENE_FILE, LOG_FILE, FIGURES = "run.nc", "mesh.vtu", "scene.toml", "run.log", "figures"
+REPORT_FILE, FIELDS = "report.html", "fields"
+LOCK_FILE = ".lock"
+TRIES, SECONDS_BETWEEN_TRIES = 5, 0.02  # for a lock that a look at it may hold for an instant
+
+
+def default_folder(scene_name):
+    """`runs/<scene>` in the current folder, numbered when that one is taken: an earlier run is never replaced."""
+    number, folder = 1, Path("runs") / scene_name
+    while folder.exists() and _content(folder) != []:
+        number += 1
+        folder = Path("runs") / f"{scene_name}-{number}"
+    return folder
+
+
+@contextlib.contextmanager
+def claimed(folder, overwrite=False):
+    """Hold a run folder for the time of a run; refuse before anything is touched.
+
+    Parameters
+    ----------
+    folder : str or path
+        Made when absent.
+    overwrite : bool
+        Replace an earlier run's own files; others are left alone.
+
+    Raises
+    ------
+    Refused
+        Not a folder, in use by another run, not writable, or not empty and `overwrite` not asked for.
+    """
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise Refused(f"output folder '{folder}': it, or one above it, is a file; choose another --out") from None
+    except OSError as error:
+        raise Refused(f"output folder '{folder}': cannot be made: {error.strerror}; choose another --out") from None
+    with _locked(folder):
+        content = _content(folder)
+        if content and not overwrite:
+            shown = ", ".join(content[:3]) + (", .." if len(content) > 3 else "")
+            raise Refused(
+                f"output folder '{folder}': not empty, it holds {shown}; choose another --out, "
+                "ask for --overwrite (overwrite=True) to replace the run in it, or for --resume to continue it"
+            )
+        for name in (RUN_FILE, MESH_FILE, SCENE_FILE, LOG_FILE, REPORT_FILE):
+            (folder / name).unlink(missing_ok=True)
+            (folder / f"{name}.journal").unlink(missing_ok=True)
+        remove_checkpoints(folder)
+        for picture in (folder / FIGURES).glob("*.png"):
+            picture.unlink()
+        for fields in (folder / FIELDS).glob("*"):
+            if fields.suffix in (".vtu", ".pvd", ".xdmf", ".h5", ".gif"):
+                fields.unlink()
+        yield folder
+
+
+@contextlib.contextmanager
+def reopened(folder):
+    """Hold the folder of an earlier run to continue it; nothing in it is touched.
+
+    Raises
+    ------
+    Refused
+        No run in it, in use by another run, or not writable.
+    """
+    folder = Path(folder)
+    if not any((folder / name).is_file() for name in (RUN_FILE, SCENE_FILE)):
+        raise Refused(
+            f"output folder '{folder}': must hold the run to resume, there is neither {RUN_FILE} nor {SCENE_FILE}; "
+            "give its folder as --out, or start a run with --overwrite instead"
+        )
+    with _locked(folder):
+        yield folder
+
+
+@contextlib.contextmanager
+def _locked(folder):
+    lock = _lock(folder)
+    try:
+        for left in folder.glob("*.tmp"):  # of a process that was killed, see `coupling.files.replace`
+            left.unlink(missing_ok=True)
+        yield
+    finally:
+        with contextlib.suppress(OSError):
+            (folder / LOCK_FILE).unlink()
+        os.close(lock)
+
+
+def _lock(folder):
+    """Take the lock; the system drops it when the process ends, however it ends."""
+    path = folder / LOCK_FILE
+    while True:
+        try:
+            lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        except OSError as error:
+            raise Refused(
+                f"output folder '{folder}': not writable: {error.strerror}; choose another --out or change its rights"
+            ) from None
+        if not _taken(lock):
+            holder = os.read(lock, 20).decode(errors="replace").strip()
+            os.close(lock)
+            raise Refused(
+                f"output folder '{folder}': in use by another run (process {holder or 'unknown'}); "
+                "wait for it or choose another --out"
+            ) from None
+        # a run that ended in between took the file away under us
+        with contextlib.suppress(FileNotFoundError):
+            if os.stat(path).st_ino == os.fstat(lock).st_ino:
+                os.truncate(lock, 0)
+                os.write(lock, f"{os.getpid()}\n".encode())
+                return lock
+        os.close(lock)
+
+
+def _taken(lock):
+    for _ in range(TRIES):
+        with contextlib.suppress(OSError):
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return True
+        clock.sleep(SECONDS_BETWEEN_TRIES)
+    return False
+
+
+def in_use(folder):
+    """Whether a process holds the folder of a run: the system drops the lock of one that was killed."""
+    try:
+        lock = os.open(Path(folder) / LOCK_FILE, os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError:
+        return True
+    finally:
+        os.close(lock)
+    return False
+
+
+def how_to_go_on(folder):
+    """The command that continues the run in a folder."""
+    return f"gush run --resume --out {shlex.quote(str(folder))}"
+
+
+def _content(folder):
+    """Names in a folder besides the lock; a file in its place counts as content."""
+    if not folder.is_dir():
+        return [folder.name]
+    return sorted(entry.name for entry in folder.iterdir() if entry.name != LOCK_FILE)

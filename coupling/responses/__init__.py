@@ -1,0 +1,1 @@
+"""The answers of rings to the pressures on their tunnels: computed, stored, held against limits, compared."""

@@ -1,0 +1,164 @@
+"""Two lining models under the same pressures: differences through the event, the largest ones with their cause."""
+
+import time as clock
+from typing import NamedTuple
+
+import numpy as np
+
+from coupling.datasets.geometry import gate_of
+from coupling.files.provenance import origin, with_history
+from coupling.refused import Refused
+from structure.response import RESPONSE, SHOWN
+
+TITLE = "differences between lining models"
+#: Forces, displacements and joints.
+QUANTITIES = tuple(name for name, (dimensions, _, _) in RESPONSE.items() if dimensions != ("time",))
+#: What differs by the offset of the curved section, and the axial force that brings it.
+OFFSETS = {
+    "bending_moment": "axial_force",
+    "joint_bending_moment": "joint_axial_force",
+    "joint_rotation": "joint_axial_force",
+}
+CURVED_SECTION = "curved section: N t²/(12 R), less what joints release"
+
+
+class Comparison(NamedTuple):
+    """Responses by model name, their differences, the table, CPU seconds by model name.
+
+    responses : dict of xarray.Dataset;  differences : xarray.Dataset, second less first;  rows : list of dict;
+    cpu_seconds : dict.
+    """
+
+    responses: dict
+    differences: object
+    rows: list
+    cpu_seconds: dict
+
+
+def compare(source, first="beam-spring", second="continuum", open_gate=None):
+    """Both models' responses to the same pressures, and how they differ.
+
+    Parameters
+    ----------
+    source : coupling.responses.source.Source
+    first, second : str
+        Lining models, see :func:`structure.lining_model`; a class in a file goes by the name of the class.
+    open_gate : float, optional
+        Cut the gate out of the ring of "continuum" over this share of the tunnel's length; its angle and
+        width come from the pressures' attributes.
+
+    Returns
+    -------
+    Comparison
+        `rows` has for every quantity, and once more for those that contain the known offset of a curved section
+        without it: name, label, unit and scale (from SI to the unit), difference (second less first, SI), relative
+        (to the largest size in the first model over the event), theta [degree] or joint (number), time [s],
+        inflow_mass [kg/m] or None, cause.
+
+    Raises
+    ------
+    Refused
+        An unknown model, the same one twice, or one that refuses ring or pressures.
+    structure.LiningFailure
+    """
+    from coupling.responses.respond import respond_by_name
+
+    places, (first, second) = (first, second), (model.rpartition(":")[2] for model in (first, second))
+    if first == second:
+        raise Refused(f"compare: models must differ, got {first!r} twice; choose another --first or --second")
+    responses, seconds = {}, {}
+    for place, name in zip(places, (first, second), strict=True):
+        options = _gate_options(source, open_gate) if open_gate is not None and name == "continuum" else {}
+        begin = clock.process_time()
+        responses[name] = respond_by_name(source.ring, source.pressures, place, **options)
+        seconds[name] = clock.process_time() - begin
+    if open_gate is not None and "continuum" not in responses:
+        raise Refused("compare: an open gate needs the continuum model, got none; choose it as --second")
+    differences = _differences(responses[first], responses[second], source.ring)
+    rows = []
+    for name in QUANTITIES:
+        if differences[name].size == 0:
+            continue
+        known = name in OFFSETS and {first, second} == {"beam-spring", "continuum"}
+        rows.append(_row(name, differences[name], responses[first], CURVED_SECTION if known else ""))
+        if known:
+            rest = differences[f"{name}_beyond_offset"]
+            rows.append(_row(name, rest, responses[first], "", ", curved section apart"))
+    return Comparison(responses, differences, rows, seconds)
+
+
+def _gate_options(source, cut):
+    gate = gate_of(source.pressures)
+    if gate is None or gate.width is None:
+        raise Refused(
+            f"'{source.file}': an open gate needs the attributes gate_angle [degree] and gate_width [m] of the"
+            " pressures, got none; leave --open-gate out"
+        )
+    return {"gate": (gate.angle, gate.width, cut)}
+
+
+def _differences(first, second, ring):
+    """Second less first, with the offset of the curved section and what is left without it."""
+    import xarray as xr
+
+    from structure.theory import curved_section_moment
+
+    missing = sorted(set(QUANTITIES) - set(first.data_vars) | set(QUANTITIES) - set(second.data_vars))
+    if missing:
+        raise Refused(f"compare: both models must give {', '.join(missing)}; see structure.response.RESPONSE")
+    fields = {}
+    for name in QUANTITIES:
+        meaning = first[name].attrs
+        fields[name] = (second[name] - first[name]).assign_attrs(
+            units=meaning["units"], long_name=f"difference of the {meaning['long_name']}"
+        )
+    for name, axial in OFFSETS.items():
+        offset = curved_section_moment(
+            first[axial],
+            ring.thickness,
+            ring.centre_radius,
+            ring.bending_stiffness,
+            len(ring.joint_angles),
+            ring.joint_rotational_stiffness,
+        )
+        if name == "joint_rotation":
+            stiffness = ring.joint_rotational_stiffness
+            offset = offset / stiffness if stiffness else offset * 0
+        sign = 1 if second.attrs.get("model") == "continuum" else -1
+        fields[f"{name}_beyond_offset"] = (fields[name] - sign * offset).assign_attrs(
+            units=fields[name].attrs["units"],
+            long_name=f"{fields[name].attrs['long_name']}, less the moment of the curved section",
+        )
+    dataset = xr.Dataset(fields)
+    if "inflow_mass" in first:
+        dataset["inflow_mass"] = first["inflow_mass"]
+    models = f"{second.attrs.get('model', 'second')} less {first.attrs.get('model', 'first')}"
+    dataset.attrs = {
+        **origin(),
+        "Conventions": "CF-1.11",
+        "title": f"{TITLE}: {models}",
+        "history": with_history("", "lining models compared"),
+    }
+    return dataset
+
+
+def _row(name, difference, first, cause, suffix=""):
+    """The largest difference of one quantity, where and when."""
+    shown = SHOWN[name]
+    values = difference.values
+    time, place = np.unravel_index(np.nanargmax(np.abs(values)), values.shape)
+    extreme = float(np.nanmax(np.abs(first[name].values)))
+    along_joints = difference.dims[1] == "joint"
+    return {
+        "name": name,
+        "label": shown.short + suffix,
+        "unit": shown.unit,
+        "scale": shown.scale,
+        "difference": float(values[time, place]),
+        "relative": abs(float(values[time, place])) / extreme if extreme else float(values[time, place] != 0),
+        "theta": None if along_joints else float(first["theta"][place]),
+        "joint": int(first["joint"][place]) if along_joints else None,
+        "time": float(first["time"][time]),
+        "inflow_mass": float(first["inflow_mass"][time]) if "inflow_mass" in first else None,
+        "cause": cause,
+    }

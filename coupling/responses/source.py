@@ -1,0 +1,113 @@
+"""Where pressures and a ring come from: a run, or any netCDF-4 file whose root follows the schema of the pressures."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+from pydantic import ValidationError
+
+from coupling.datasets import RunFileError, opened, run_file
+from coupling.datasets.geometry import on_tunnel, tunnels_beside
+
+
+class Source(NamedTuple):
+    """Pressures of one tunnel and the ring they act on.
+
+    file : path;  is_own : whether they are the group /lining of a run and the ring is that run's own, so that the
+    response belongs into the run;  pressures : xarray.Dataset (time, theta) [Pa];  ring : structure.Ring;
+    tunnel : int or None, None: the only one, or that with the gate.
+    """
+
+    file: Path
+    is_own: bool
+    pressures: object
+    ring: object
+    tunnel: int | None = None
+
+
+def read_source(path, scene=None):
+    """Pressures and ring of the tunnel with the gate: the first of :func:`read_sources`."""
+    return read_sources(path, scene)[0]
+
+
+def read_sources(path, scene=None):
+    """Pressures and rings of a run, or of a file written by hand or by another program, one for each tunnel.
+
+    Parameters
+    ----------
+    path : str or path
+        A run's folder or file, or a netCDF-4 file with soil_pressure, water_pressure, soil_shear (time, theta) [Pa].
+    scene : str, optional
+        Scene whose rings are taken. Left out: the scene stored with the run, or the attribute `ring` (JSON of a
+        `structure.Ring`) of the file.
+
+    Returns
+    -------
+    list of Source
+        That of the tunnel with the gate first.
+
+    Raises
+    ------
+    RunFileError
+        Unreadable, not following the schema, or without a ring: which file, rule, value, remedy.
+    coupling.refused.SceneError
+        No such scene, or one whose rings do not fit its tunnels.
+    """
+    from coupling.refused import SceneError
+    from coupling.scenes.scene import load_scene, parse_scene
+
+    file = run_file(path)
+    with opened(file) as run:
+        is_run = "lining" in run.names()
+        root = run.group(None)
+        pressures = run.group("lining") if is_run else root
+    chosen = own = None
+    if "scene" in root.attrs:
+        try:
+            own = chosen = parse_scene(root.attrs["scene"], str(file))
+        except SceneError:  # of another version
+            if scene is None:
+                raise
+    if scene is not None:
+        chosen = load_scene(scene)
+    if "tunnel" not in pressures.dims:
+        return [_source(file, is_run, pressures, root, own, chosen, None)]
+    numbers = [None, *tunnels_beside(pressures)]
+    if chosen is not None and len(chosen.mpm.tunnels) < len(numbers):
+        raise RunFileError(
+            f"'{file}': holds {len(numbers)} tunnels, scene '{chosen.name}' has {len(chosen.mpm.tunnels)}; choose a "
+            "--scene with as many, or select a tunnel of the pressures"
+        )
+    return [_source(file, is_run, on_tunnel(pressures, k), root, own, chosen, k) for k in numbers]
+
+
+def _source(file, is_run, pressures, root, own, chosen, tunnel):
+    from structure.lining import check_pressures
+
+    ring = _ring(file, root, chosen, tunnel)
+    try:
+        checked = check_pressures(pressures, ring)
+    except ValueError as problem:
+        raise RunFileError(f"'{file}': {problem}") from problem
+    is_own = is_run and own is not None and own.ring is not None and _ring(file, root, own, tunnel) == ring
+    return Source(file, is_own, checked, ring, tunnel)
+
+
+def _ring(file, root, scene, tunnel):
+    from coupling.scenes.rings import ring_of
+    from structure import Ring
+    from structure.inputs import mistakes, refusal
+
+    if scene is not None:
+        if scene.ring is None:
+            raise RunFileError(f"'{file}': scene '{scene.name}' has no [ring]; choose another --scene")
+        return scene.ring if tunnel is None else ring_of(scene, tunnel)
+    if "ring" not in root.attrs:
+        raise RunFileError(
+            f"'{file}': needs a ring, got neither a scene nor the attribute 'ring'; give --scene, e.g. --scene case-3,"
+            " or store structure.Ring(..).model_dump_json() as the attribute 'ring'"
+        )
+    try:
+        return Ring.model_validate_json(root.attrs["ring"])
+    except ValidationError as problem:
+        told = refusal("it", mistakes(problem, Ring))
+        raise RunFileError(f"'{file}': attribute 'ring' must describe a structure.Ring: {told}") from None

@@ -1,0 +1,1 @@
+"""Runs: started, written as they go, resumed, repeated, and planned."""

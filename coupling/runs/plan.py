@@ -1,0 +1,233 @@
+"""What a run would do and cost, before it starts: the table and the JSON of `gush plan`."""
+
+from __future__ import annotations
+
+import math
+import time as clock
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from coupling.runs.memory import check_memory, free_memory_bytes
+from coupling.scenes.features import features, initial_k0
+from coupling.scenes.plausibility import warn_in_python, warnings_of
+from coupling.scenes.scene import as_scene
+
+if TYPE_CHECKING:
+    from coupling.scenes.scene import Scene
+    from mpm.scene import Scene as MpmScene
+
+
+WARM_UP_STEPS, MEASURED_SPELLS, SECONDS_A_SPELL = 10, 5, 0.3
+# Inflow of grains over that of free discharge under the head at the gate, from runs of case 3 (docs/case-3.md): a rough
+# guess that only the expected duration uses.
+DISCHARGE_SHARE = 0.11
+
+
+def plan(
+    scene: Scene | str | Path, threads: int | None = None, warn: Callable[[str], None] | None = None
+) -> dict[str, Any]:
+    """Build the mesh and the points of a scene, take a few steps, and say what the run will cost.
+
+    Parameters
+    ----------
+    scene : coupling.Scene, str or path
+        As of :func:`coupling.run`.
+    threads : int or None
+    warn : callable or None
+        As of :func:`coupling.run`.
+
+    Returns
+    -------
+    dict
+        scene; features: list of {feature, active, reason}; initial_k0: see :func:`initial_k0`; elements, nodes, points;
+        min_altitude [m]; min_angle [degree]; dt [s]; dt_limit; stop_time [s] or None; stop_inflow_mass [kg/m] or None;
+        steps_to_stop_time (None without a stop time); expected_time [s] and expected_steps: rough where an inflow mass
+        stops the run; steps are those of the smallest elements, cut to the output interval; expected_point_steps:
+        updates of one point by one step; records; memory_bytes, free_memory_bytes; point_steps_per_second: measured
+        now; expected_seconds: of stepping, without mesh, relaxation and pictures. Steps are counted with the step of
+        the initial state; where ground flows it becomes up to a third shorter.
+    """
+    import mpm
+
+    scene = _checked(scene, warn)
+    mesh = mpm.build_mesh(scene.mpm)
+    solver = mpm.Solver(scene.mpm, mesh, threads)
+    dt, limit = solver.time_step_estimate()
+    rate = _measured_rate(solver)
+    stop = scene.mpm.stop
+    time, interval = expected_time(scene.mpm), scene.mpm.output.interval
+    most = None if stop.time is None else _work(solver, dt, interval, stop.time)[0]
+    steps, point_steps = _work(solver, dt, interval, time)
+    return {
+        "scene": scene.name,
+        "features": features(scene, solver.threads, _why_alone(len(solver.mesh.elements), threads)),
+        "initial_k0": initial_k0(scene.mpm),
+        "elements": len(solver.mesh.elements),
+        "nodes": len(solver.mesh.nodes),
+        "points": int(solver.n_points),
+        "min_altitude": float(mesh.quality["min_altitude"]),
+        "min_angle": float(mesh.quality["min_angle"]),
+        "dt": float(dt),
+        "dt_limit": limit,
+        "stop_time": stop.time,
+        "stop_inflow_mass": stop.inflow_mass,
+        "steps_to_stop_time": most,
+        "expected_time": time,
+        "expected_steps": steps,
+        "expected_point_steps": point_steps,
+        "records": 1 + _intervals(interval, time)[0],
+        "memory_bytes": int(solver.memory_bytes()),
+        "free_memory_bytes": free_memory_bytes(),
+        "point_steps_per_second": rate,
+        "expected_seconds": point_steps / rate,
+    }
+
+
+def _checked(scene, warn):
+    """A valid scene that fits into the memory, what is unusual in it told."""
+    scene = as_scene(scene)
+    for warning in warnings_of(scene):
+        (warn if warn is not None else warn_in_python)(warning)
+    check_memory(scene.mpm)
+    return scene
+
+
+def _intervals(interval, time):
+    """Number of output intervals until a time, and the length of the last [s]."""
+    count = max(math.ceil(time / interval * (1 - 1e-12)), 1)
+    return count, time - (count - 1) * interval
+
+
+def _work(solver, dt, interval, time):
+    """Steps of the smallest elements, and updates of one point by one step, until a time."""
+    count, last = _intervals(interval, time)
+    full, rest = (np.array(_work_within(solver, length / dt)) for length in (interval, last))
+    steps, point_steps = (count - 1) * full + rest
+    return int(steps), int(point_steps)
+
+
+def _work_within(solver, steps):
+    """The same within one interval, `steps` times the critical step of the smallest elements long."""
+    from mpm.clock import choose_periods
+
+    points = np.diff(solver.start[solver.levels.element_cuts]).astype(np.int64)
+    periods = np.ones(len(points), np.int64)
+    made = updates = 0
+    several = 2
+    while several > 1:  # how to go on is chosen after each step of the coarsest level
+        several = choose_periods(points, float(steps), periods)
+        made += int(periods[-1])
+        updates += int(np.sum(points * (periods[-1] // periods)))
+        steps -= min(steps / several, float(periods[-1]))
+    return made, updates
+
+
+def _why_alone(elements, asked):
+    """Why a mesh of so many elements is computed by one thread; empty where it is not."""
+    from mpm.solver import SMALLEST_PARALLEL, cores
+
+    if elements < SMALLEST_PARALLEL:
+        return f"{elements:.0f} elements, a second thread pays from {SMALLEST_PARALLEL}"
+    return "one was asked for" if asked == 1 else "one core" if asked is None and cores() == 1 else ""
+
+
+def rough_plan(
+    scene: Scene | str | Path, threads: int | None = None, warn: Callable[[str], None] | None = None
+) -> dict[str, Any]:
+    """What a run would do and cost, from formulas alone: no mesh, no points, some milliseconds.
+
+    Parameters are those of :func:`plan`.
+
+    Returns
+    -------
+    dict
+        Keys of :func:`plan` that need no mesh: scene, features, initial_k0, elements, points, dt [s], stop_time [s],
+        stop_inflow_mass [kg/m], steps_to_stop_time, expected_time [s], expected_steps, records, memory_bytes,
+        free_memory_bytes. Elements, points and dt are right within a factor of three where the mesh is regular.
+
+    Raises
+    ------
+    coupling.refused.Refused
+        Too little memory.
+    """
+    from mpm.solver import threads_used
+    from mpm.threads import check_threads
+
+    scene = _checked(scene, warn)
+    check_threads(threads)
+    s = scene.mpm
+    elements, time = s.estimated_elements, expected_time(s)
+    sizes = [s.discretisation.element_size] + [s.discretisation.element_size_lining] * bool(s.tunnels)
+    if s.gate is not None:
+        sizes.append(s.gate.width / s.discretisation.elements_across_gate)
+    # between the altitude of an equilateral triangle and the flattest that the mesher lets pass
+    dt = s.numerics.courant * 0.6 * min(sizes) / max(_wave_speed(soil, s.water) for soil in s.soils)
+    return {
+        "scene": scene.name,
+        "features": features(scene, threads_used(elements, threads), _why_alone(elements, threads)),
+        "initial_k0": initial_k0(s),
+        "elements": math.ceil(elements),
+        "points": math.ceil(elements * s.discretisation.points_per_element),
+        "dt": dt,
+        "stop_time": s.stop.time,
+        "stop_inflow_mass": s.stop.inflow_mass,
+        "steps_to_stop_time": None if s.stop.time is None else _rough_steps(dt, s.output.interval, s.stop.time),
+        "expected_time": time,
+        "expected_steps": None if time is None else _rough_steps(dt, s.output.interval, time),
+        "records": None if time is None else 1 + _intervals(s.output.interval, time)[0],
+        "memory_bytes": math.ceil(s.estimated_bytes),
+        "free_memory_bytes": free_memory_bytes(),
+    }
+
+
+def _rough_steps(dt, interval, time):
+    """Steps until a time where each output interval takes a whole number of them."""
+    count, last = _intervals(interval, time)
+    return (count - 1) * math.ceil(interval / dt) + math.ceil(last / dt)
+
+
+def _wave_speed(soil, water):
+    from mpm.time_step import dry_wave_speed, fast_wave_speed
+
+    nu = soil.poissons_ratio
+    modulus = soil.youngs_modulus * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
+    if water is None:
+        return dry_wave_speed(modulus, soil.porosity, soil.grain_density)
+    return fast_wave_speed(modulus, water.bulk_modulus, soil.porosity, soil.grain_density, water.density)
+
+
+def expected_time(mpm_scene: MpmScene) -> float | None:
+    """Simulated time until the run stops [s]; a rough guess where an inflow mass stops it."""
+    stop = mpm_scene.stop
+    if stop.inflow_mass is None or mpm_scene.gate is None:
+        return stop.time
+    tunnel = mpm_scene.tunnels[mpm_scene.gate.tunnel]
+    depth = tunnel.axis_depth - tunnel.outer_radius * math.cos(math.radians(mpm_scene.gate.angle))
+    # dry grains fall out freely from about one gate width above it
+    water = mpm_scene.water
+    head = max(depth - water.table_depth, 0.1 * depth) if water is not None else mpm_scene.gate.width
+    soil = [layer for layer in mpm_scene.soils if layer.top_depth <= depth][-1]
+    velocity = DISCHARGE_SHARE * math.sqrt(2 * mpm_scene.gravity * head)
+    inflow_rate = velocity * mpm_scene.gate.width * (1 - soil.porosity) * soil.grain_density
+    if inflow_rate == 0:
+        return stop.time
+    # the rate grows evenly for twice the delay, in which grains fall freely up to that velocity
+    delay, steady = velocity / (2 * mpm_scene.gravity), stop.inflow_mass / inflow_rate
+    time = steady + delay if steady > delay else 2 * math.sqrt(delay * steady)
+    return time if stop.time is None else min(time, stop.time)
+
+
+def _measured_rate(solver):
+    """Point-steps per second of wall time with the gate closed: the best of some short spells."""
+    for _ in range(WARM_UP_STEPS):
+        solver.step()
+    rates = []
+    for _ in range(MEASURED_SPELLS):
+        before, begin = solver.point_steps, clock.monotonic()
+        while clock.monotonic() - begin < SECONDS_A_SPELL:
+            solver.step()
+        rates.append((solver.point_steps - before) / (clock.monotonic() - begin))
+    return max(rates)

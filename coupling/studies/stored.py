@@ -1,0 +1,69 @@
+"""What `gush study` does."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from coupling.files.replace import replaced
+from structure.models import model_name
+
+#: Keys of a case's result.
+RESULTS = ("cpu_seconds", "inflow_mass", "time", "axial_force", "bending_moment")
+
+
+def run_study(name, out, workers, scheduler, console):
+    """Run a study, store its dataset as study.nc, and return what the command shows.
+
+    Returns
+    -------
+    dict
+        study, folder, data: path of the dataset; model: the first lining model; cases: list of dicts with case, name,
+        parameters, status, message, cpu_seconds [s], and at the last inflow mass reached: inflow_mass [kg/m], time [s],
+        axial_force [N/m] and bending_moment [N m/m] of that model as {max, min}, None without a ring.
+    """
+    from coupling.datasets import write_dataset
+    from coupling.studies.design import cases, load_study
+    from coupling.studies.execute import DATA_FILE, study, study_folder
+    from coupling.studies.progress import StudyLine
+
+    plan = load_study(name)
+    folder = study_folder(name, plan, out)
+    with StudyLine(console) as line:
+        dataset = study(plan, folder, workers, scheduler, partial(console.print, highlight=False, soft_wrap=True), line)
+    with replaced(folder / DATA_FILE) as beside:
+        if dataset.chunks:  # of a large study, loaded piece by piece
+            dataset.to_netcdf(beside, engine="h5netcdf")
+        else:
+            write_dataset(beside, dataset)
+    rows = []
+    for case in cases(plan):
+        one = dataset.sel(case=case.index)
+        status = str(one["status"].values)
+        rows.append(
+            {
+                "case": case.index,
+                "name": case.name,
+                "parameters": case.parameters,
+                "status": status,
+                "message": str(one["message"].values),
+                **(_result(one, plan.backends) if status == "finished" else dict.fromkeys(RESULTS)),
+            }
+        )
+    model = model_name(plan.backends[0]) if plan.backends else None
+    return {"study": plan.name, "folder": str(folder), "data": str(folder / DATA_FILE), "model": model, "cases": rows}
+
+
+def _result(one, backends):
+    """What a finished case came to, at the last inflow mass that it reached."""
+    reached = np.flatnonzero(np.isfinite(one["time"].values))
+    last = one.isel(progress=reached[-1] if len(reached) else 0)
+    found = {name: float(last[name]) for name in ("cpu_seconds", "inflow_mass", "time")}
+    for name in ("axial_force", "bending_moment"):
+        found[name] = None
+        if name in last:
+            values = last[name].sel(model=model_name(backends[0])) if "model" in last.dims else last[name]
+            if np.isfinite(values).any():
+                found[name] = {"max": float(values.max()), "min": float(values.min())}
+    return found

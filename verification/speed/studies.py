@@ -1,0 +1,120 @@
+"""A study of six short cases by two workers beside a plain loop over `coupling.run` of the same cases.
+
+    uv run python -m verification.speed.studies            # --rounds 3; --print-only leaves docs/performance.md alone
+
+Both answer with the ring and draw no pictures. Each is a process of its own that begins with compiled kernels and
+bytecode, as any start but the first; they run in turns, and the fastest of each counts, since other programs only slow
+them down.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time as clock
+from pathlib import Path
+
+from verification.pages import DOCS, need_docs, provenance
+
+ANGLES = [15.0, 30.0, 45.0, 60.0, 75.0, 90.0]
+#: About two seconds of processor time a case, half of it for files and the ring.
+TINY = {
+    "discretisation.element_size": 4.0, "discretisation.element_size_lining": 0.8,
+    "discretisation.element_size_interior": 0.5, "discretisation.size_growth": 0.4,
+    "stop.inflow_mass": 20.0, "stop.time": 0.1, "output.interval": 0.02,
+}  # fmt: skip
+LOOP = """
+import sys, coupling
+from verification.speed.studies import ANGLES, TINY
+for angle in ANGLES:
+    scene = coupling.load_scene("quick", **TINY, **{"gate.angle": angle})
+    coupling.run(scene, f"{sys.argv[1]}/{angle:g}", response=True, threads=int(sys.argv[2]) or None)
+"""
+STUDY = """
+import sys, coupling
+from verification.speed.studies import ANGLES, TINY
+plan = {"name": "tiny", "fixed": TINY, "records": 3, "parameters": {"gate.angle": ANGLES}}
+study = coupling.study(plan, sys.argv[1], workers=int(sys.argv[2]))
+assert (study["status"] == "finished").all() and "bending_moment" in study, study["message"].values
+"""
+WAYS = {
+    "loop, all cores": (LOOP, "0"),
+    "loop, one thread": (LOOP, "1"),
+    "study, two workers": (STUDY, "2"),
+}
+HEADING = "## A study of short cases"
+
+
+def study_seconds(rounds=3, tell=lambda line: None):
+    """Wall and processor time of each of `WAYS` [s]: dict with rounds, load and the share of the loop that it takes."""
+    load = [os.getloadavg()[0]]
+    found = {name: [] for name in WAYS}
+    with tempfile.TemporaryDirectory() as place:
+        kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+        environment = {**kept, "PYTHONPYCACHEPREFIX": f"{place}/bytecode", "PYTHONWARNINGS": "ignore"}
+        for number in range(-1, rounds):  # the first compiles
+            for name, (code, argument) in WAYS.items():
+                wall, used = clock.perf_counter(), sum(os.times()[2:4])
+                folder = f"{place}/{number}-{name}"
+                subprocess.run([sys.executable, "-c", code, folder, argument], check=True, env=environment)
+                seconds = [clock.perf_counter() - wall, sum(os.times()[2:4]) - used]
+                tell(f"{name}: {seconds[0]:.1f} s by the clock, {seconds[1]:.1f} s of processor time")
+                if number >= 0:
+                    found[name].append(seconds)
+    best = {name: min(times) for name, times in found.items()}
+    loop = min(best["loop, all cores"], best["loop, one thread"])
+    return {
+        "rounds": found,
+        "best": best,
+        "share_of_loop": best["study, two workers"][0] / loop[0],
+        "load": [*load, os.getloadavg()[0]],
+        **provenance(),
+    }
+
+
+def section(data):
+    """Lines of the section of docs/performance.md."""
+    return [
+        HEADING,
+        "",
+        "`uv run python -m verification.speed.studies`: six gates on a mesh of 4 m (the scene `coarse` of the "
+        "[how-to](how-to/run-a-study.md)), each with the response of the ring and without pictures; whole processes "
+        "that find kernels and bytecode compiled, in turns, the fastest of "
+        f"{len(data['rounds']['loop, all cores'])} each.",
+        "",
+        "| | s by the clock | s of processor time |",
+        "|---|---|---|",
+        *(f"| {name} | {wall:.1f} | {used:.1f} |" for name, (wall, used) in data["best"].items()),
+        "",
+        f"The study takes {data['share_of_loop']:.2f} of the faster loop. Measured {data['date']} at revision "
+        f"{data['revision']} on {data['machine']}; mean number of running programs {data['load'][0]:.1f} before, "
+        f"{data['load'][1]:.1f} after.",
+    ]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--print-only", action="store_true", help="leave docs/performance.md as it is")
+    chosen = parser.parse_args()
+    if not chosen.print_only:
+        need_docs()
+    data = study_seconds(chosen.rounds, lambda line: print(line, file=sys.stderr, flush=True))
+    if not chosen.print_only:
+        write(data)
+    print(json.dumps(data, indent=1))
+
+
+def write(data, docs=DOCS):
+    """Put the section into docs/performance.md, whose last it is, and the numbers into docs/performance.json."""
+    page, numbers = Path(docs) / "performance.md", Path(docs) / "performance.json"
+    above = page.read_text(encoding="utf-8").split(HEADING)[0].rstrip("\n")
+    page.write_text("\n".join([above, "", *section(data)]) + "\n", encoding="utf-8")
+    stored = json.loads(numbers.read_text(encoding="utf-8")) | {"study": data}
+    numbers.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
