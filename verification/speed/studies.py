@@ -122,9 +122,8 @@ def section(data):
         "",
         f"The study takes {data['share_of_loop']:.2f} of the faster loop by the clock; mean number of running programs "
         f"{data['load'][0]:.1f} before, {data['load'][1]:.1f} after. Its longest path has "
-        f"{path} s of processor time (until the workers start, their loading, half of their cases, collecting), which is "
-        f"**{data['share_on_idle_cores']:.2f}** of the loop of one thread: what two cores take that nothing else is at. "
-        "By the clock two workers gain only where nothing else runs. "
+        f"{path} s of processor time (until the workers start, their loading, half of their cases, collecting), "
+        f"**{data['share_on_idle_cores']:.2f}** of that of the loop of one thread: what two idle cores would take. "
         f"Measured {data['date']} at revision {data['revision']} on {data['machine']}.",
     ]
 
