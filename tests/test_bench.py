@@ -1,5 +1,6 @@
 """What `gush bench` says about a step adds up, and its counts are those of the arrays and the source."""
 
+import json
 import math
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 import mpm
 from verification.small_event import small_scene
-from verification.speed import layout, processes
+from verification.speed import layout, processes, studies
 from verification.speed.command import bench
 from verification.speed.sizes import slope
 from verification.speed.stepping import configurations, kernel_times, prepared
@@ -73,3 +74,16 @@ def test_step_is_measured_beside_the_reference_and_the_copy():
 def test_solver_is_imported_within_a_third_of_a_second_of_numba():
     """Processor time; the limit is 0.3 s, and an import that compiles or meshes takes seconds."""
     assert processes.import_seconds(["mpm over numba"])["mpm over numba"] < 0.3
+
+
+def test_section_on_studies_is_the_last_of_its_page_and_written_anew(tmp_path):
+    for name in ("performance.md", "performance.json"):
+        (tmp_path / name).write_bytes((studies.DOCS / name).read_bytes())
+    data = json.loads((tmp_path / "performance.json").read_text())["study"]
+    before = (tmp_path / "performance.md").read_text()
+    studies.write(data, tmp_path)
+    assert (tmp_path / "performance.md").read_text() == before
+    studies.write(data | {"share_of_loop": 0.123}, tmp_path)
+    after = (tmp_path / "performance.md").read_text()
+    assert after.count(studies.HEADING) == 1 and "takes 0.12 of the faster loop" in after
+    assert after.split(studies.HEADING)[0] == before.split(studies.HEADING)[0]

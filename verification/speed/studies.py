@@ -4,7 +4,7 @@
 
 Both answer with the ring and draw no pictures. Each is a process of its own that begins with compiled kernels and
 bytecode, as any start but the first; they run in turns, and the fastest of each counts, since other programs only slow
-them down.
+them down. Where they do so all the time, the processor time on the longest path tells what two idle cores would take.
 """
 
 import argparse
@@ -33,11 +33,22 @@ for angle in ANGLES:
     coupling.run(scene, f"{sys.argv[1]}/{angle:g}", response=True, threads=int(sys.argv[2]) or None)
 """
 STUDY = """
-import sys, coupling
+import os, sys, time, coupling
 from verification.speed.studies import ANGLES, TINY
-plan = {"name": "tiny", "fixed": TINY, "records": 3, "parameters": {"gate.angle": ANGLES}}
-study = coupling.study(plan, sys.argv[1], workers=int(sys.argv[2]))
+plan, told = {"name": "tiny", "fixed": TINY, "records": 3, "parameters": {"gate.angle": ANGLES}}, []
+study = coupling.study(
+    plan, sys.argv[1], workers=int(sys.argv[2]), progress=lambda line: told.append(time.process_time())
+)
 assert (study["status"] == "finished").all() and "bending_moment" in study, study["message"].values
+print(told[0], time.process_time() - told[-1], sum(os.times()[2:4]))
+"""
+LOAD = """
+import time
+from importlib import import_module
+from coupling.studies.worker import LOADED
+for name in LOADED:
+    import_module(name)
+print(time.process_time())
 """
 WAYS = {
     "loop, all cores": (LOOP, "0"),
@@ -48,9 +59,17 @@ HEADING = "## A study of short cases"
 
 
 def study_seconds(rounds=3, tell=lambda line: None):
-    """Wall and processor time of each of `WAYS` [s]: dict with rounds, load and the share of the loop that it takes."""
+    """What each of `WAYS` takes.
+
+    Returns
+    -------
+    dict
+        rounds, best: name to wall and processor time [s]; path: processor time of the study before its workers start,
+        while they load, of a half of their cases, and after the last one [s]; share_of_loop: of the wall time of the
+        faster loop; share_on_idle_cores: of path over the processor time of the loop of one thread; load, provenance.
+    """
     load = [os.getloadavg()[0]]
-    found = {name: [] for name in WAYS}
+    found, paths = {name: [] for name in WAYS}, []
     with tempfile.TemporaryDirectory() as place:
         kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
         environment = {**kept, "PYTHONPYCACHEPREFIX": f"{place}/bytecode", "PYTHONWARNINGS": "ignore"}
@@ -58,24 +77,37 @@ def study_seconds(rounds=3, tell=lambda line: None):
             for name, (code, argument) in WAYS.items():
                 wall, used = clock.perf_counter(), sum(os.times()[2:4])
                 folder = f"{place}/{number}-{name}"
-                subprocess.run([sys.executable, "-c", code, folder, argument], check=True, env=environment)
+                done = _python(environment, code, folder, argument)
                 seconds = [clock.perf_counter() - wall, sum(os.times()[2:4]) - used]
                 tell(f"{name}: {seconds[0]:.1f} s by the clock, {seconds[1]:.1f} s of processor time")
                 if number >= 0:
                     found[name].append(seconds)
+                if number >= 0 and code is STUDY:
+                    before, after, workers = done
+                    (loading,) = _python(environment, LOAD)
+                    paths.append([before, loading, (workers - loading) / 2, after])
     best = {name: min(times) for name, times in found.items()}
-    loop = min(best["loop, all cores"], best["loop, one thread"])
+    path, loop = min(paths, key=sum), min(best["loop, all cores"], best["loop, one thread"])
     return {
         "rounds": found,
         "best": best,
+        "path": path,
         "share_of_loop": best["study, two workers"][0] / loop[0],
+        "share_on_idle_cores": sum(path) / min(used for _, used in found["loop, one thread"]),
         "load": [*load, os.getloadavg()[0]],
         **provenance(),
     }
 
 
+def _python(environment, *arguments):
+    command = [sys.executable, "-c", *arguments]
+    done = subprocess.run(command, check=True, env=environment, stdout=subprocess.PIPE, text=True)
+    return [float(word) for word in done.stdout.split()]
+
+
 def section(data):
     """Lines of the section of docs/performance.md."""
+    path = " + ".join(f"{seconds:.1f}" for seconds in data["path"])
     return [
         HEADING,
         "",
@@ -88,9 +120,11 @@ def section(data):
         "|---|---|---|",
         *(f"| {name} | {wall:.1f} | {used:.1f} |" for name, (wall, used) in data["best"].items()),
         "",
-        f"The study takes {data['share_of_loop']:.2f} of the faster loop. Measured {data['date']} at revision "
-        f"{data['revision']} on {data['machine']}; mean number of running programs {data['load'][0]:.1f} before, "
-        f"{data['load'][1]:.1f} after.",
+        f"The study takes {data['share_of_loop']:.2f} of the faster loop by the clock; mean number of running programs "
+        f"{data['load'][0]:.1f} before, {data['load'][1]:.1f} after. Its longest path has "
+        f"{path} s of processor time (until the workers start, their loading, half of their cases, collecting), "
+        f"**{data['share_on_idle_cores']:.2f}** of that of the loop of one thread: what two idle cores would take. "
+        f"Measured {data['date']} at revision {data['revision']} on {data['machine']}.",
     ]
 
 
