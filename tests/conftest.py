@@ -1,7 +1,9 @@
 """Scenes and meshes shared by the tests: built once, changed never."""
 
 import pytest
+import xarray as xr
 from browser import Browser, find_browser
+from running import without_simulation
 
 import coupling
 from mpm.mesh import Mesh
@@ -38,3 +40,24 @@ def opened(report, browser):
     browser.open(report)
     yield browser
     assert browser.complaints == []
+
+
+@pytest.fixture
+def simulated(monkeypatch):
+    """Replaces meshing and simulation by made records; `ending` is what is raised after them."""
+    return without_simulation(monkeypatch)
+
+
+@pytest.fixture
+def written(tmp_path):
+    """A file by another program: three times, inflow and gate, the ring as an attribute."""
+    from test_continuum_lining import pressures, ring
+
+    base = pressures().isel(time=0, drop=True)
+    times = xr.DataArray([0.0, 1.0, 2.0], dims="time", attrs={"units": "s"})
+    loads = base.map(lambda part: part * (1 - 0.1 * times)).transpose("time", "theta").assign_coords(time=times)
+    loads["inflow_mass"] = ("time", [0.0, 50.0, 100.0])
+    loads.attrs = {"ring": ring().model_dump_json(), "gate_angle": 90.0, "gate_width": 0.2}
+    file = tmp_path / "mine.nc"
+    loads.to_netcdf(file, engine="h5netcdf")
+    return file

@@ -220,7 +220,7 @@ def twin_answers(twin: RunEvidence) -> list[Answer]:
 def mirror_answers(difference: dict[str, float]) -> list[Answer]:
     """Our own check: case 3 with its gate at 270 degrees is the mirror image of case 3.
 
-    The mesher does not give the mirror image of a mesh; on one, runs agree to rounding (tests/test_gushing.py).
+    The mesher does not give the mirror image of a mesh; on one, runs agree to rounding (tests/physics/test_gushing.py).
     """
     return [
         Answer(f"case 3 mirrored: {name.replace('_', ' ')}", "(ours)", f"{value:.1e}", abs(value) < 0.1,

@@ -68,7 +68,7 @@ Numbers of this list are of trials made while this command was written; the tabl
 ## What is not covered
 
 Linear columns are uniform: one soil, one cell size, so one level; that waves do not grow across levels is shown by
-`tests/test_local_time_stepping.py`. Kinetic energy in the water counts at the points, which move with
+`tests/physics/test_local_time_stepping.py`. Kinetic energy in the water counts at the points, which move with
 the grains; water that runs through gravel carries its momentum but not its place. Runs are coarse and short; that
 they are stable says nothing about accuracy.
 """

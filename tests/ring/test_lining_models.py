@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from test_cli import gush, simulated  # noqa: F401
+from running import gush
 from test_continuum_lining import pressures, ring
 
 import structure
@@ -16,7 +16,7 @@ from coupling.runs.run import run
 from structure import models
 from verification.synthetic_run import make_quick_scene
 
-DOCUMENT = Path(__file__).parent.parent / "docs" / "lining-models.md"
+DOCUMENT = Path(__file__).parents[2] / "docs" / "lining-models.md"
 
 
 @pytest.fixture
@@ -27,19 +27,6 @@ def example(monkeypatch):
     names = {}
     exec(code, names)
     return names["EfficiencyRing"]
-
-
-@pytest.fixture
-def written(tmp_path):
-    """A file by another program: three times, inflow and gate, the ring as an attribute."""
-    base = pressures().isel(time=0, drop=True)
-    times = xr.DataArray([0.0, 1.0, 2.0], dims="time", attrs={"units": "s"})
-    loads = base.map(lambda part: part * (1 - 0.1 * times)).transpose("time", "theta").assign_coords(time=times)
-    loads["inflow_mass"] = ("time", [0.0, 50.0, 100.0])
-    loads.attrs = {"ring": ring().model_dump_json(), "gate_angle": 90.0, "gate_width": 0.2}
-    file = tmp_path / "mine.nc"
-    loads.to_netcdf(file, engine="h5netcdf")
-    return file
 
 
 def test_models_are_found_by_name():
@@ -144,7 +131,7 @@ def test_comparison_of_a_file_written_by_hand(written, tmp_path):
         assert differences["bending_moment"].attrs["units"] == "N m/m"
 
 
-def test_run_keeps_the_responses_of_both_models(simulated, tmp_path):  # noqa: F811
+def test_run_keeps_the_responses_of_both_models(simulated, tmp_path):
     folder = tmp_path / "a"
     run(make_quick_scene(), folder)
     result = gush("respond", folder, "--backend", "continuum")

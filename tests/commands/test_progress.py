@@ -3,15 +3,13 @@
 import time as clock
 
 import pytest
-from test_cli import gush, simulated
+from running import gush
 
 import coupling
 from coupling.datasets import RunFileError, read_response
 from coupling.runs import progress_line
 from coupling.runs.progress_line import ProgressLine
 from verification.stability import command as stability_command
-
-assert simulated  # a fixture
 
 
 @pytest.fixture

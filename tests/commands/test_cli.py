@@ -6,15 +6,13 @@ import signal
 import subprocess
 import sys
 import time
-from types import SimpleNamespace
 
 import pytest
-from typer.testing import CliRunner
+from running import gush
 
 import coupling
 import mpm
 from coupling import datasets
-from coupling.cli import app
 from coupling.figures import draw_run
 from coupling.files.folder import claimed, default_folder
 from coupling.refused import Refused
@@ -22,55 +20,9 @@ from coupling.runs.memory import check_memory
 from coupling.runs.progress_line import ProgressLine
 from coupling.runs.run import run
 from coupling.scenes.features import features
-from verification.synthetic_run import make_quick_scene, record
+from verification.synthetic_run import make_quick_scene
 
 HEAVY = ("numba", "xarray", "matplotlib", "pint", "scipy", "skfem", "gmsh", "numpy")
-
-
-class Bare:
-    """A mesh for runs that are not simulated."""
-
-    def __init__(self):
-        from verification.synthetic_run import TwoTriangles
-
-        self.nodes, self.elements, self.region = TwoTriangles.nodes, TwoTriangles.elements, TwoTriangles.region
-        self.quality = {"n_elements": 2}
-
-    def save(self, path):
-        path.write_text("<mesh/>")
-
-
-@pytest.fixture
-def simulated(monkeypatch):
-    """Replaces meshing and simulation by synthetic records; `ending` is what is raised after them."""
-    state = SimpleNamespace(ending=None)
-
-    class Simulation:
-        def __init__(self, scene, mesh, threads, progress):
-            self.count, self.done, self.progress, self.unborne_shear = 0, False, progress, 0.0
-
-        def begin(self):
-            return self.advance(None)
-
-        def advance(self, pause):
-            k, self.count = self.count, self.count + 1
-            self.progress({"stage": "gush", "time": 0.1 * k, "inflow_mass": 30.0 * k, "dt": 1e-4, "step": k,
-                           "dt_limit": "acoustic", "point_steps_per_second": 5e6, "share": 0.3 * k})  # fmt: skip
-            if k == 3:
-                raise state.ending
-            self.done = k == 2 and state.ending is None
-            return record(0.1 * k, snapshot=k != 1)
-
-        def state(self):
-            return {"step_count": self.count}
-
-    monkeypatch.setitem(vars(mpm), "Simulation", Simulation)
-    monkeypatch.setitem(vars(mpm), "build_mesh", lambda scene: Bare())
-    return state
-
-
-def gush(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def test_help_loads_no_heavy_library():

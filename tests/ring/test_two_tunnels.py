@@ -6,7 +6,7 @@ import shutil
 
 import numpy as np
 import pytest
-from test_cli import gush
+from running import gush
 
 import coupling
 from coupling.datasets import read_pressures, read_response

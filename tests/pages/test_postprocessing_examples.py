@@ -9,7 +9,7 @@ import coupling
 from coupling.responses.respond import respond
 from verification.small_event import small_scene
 
-PAGE = (Path(__file__).parent.parent / "docs" / "postprocessing.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "postprocessing.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```python\n(.*?)```", PAGE, re.S)
 
 

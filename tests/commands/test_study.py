@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from test_cli import gush
+from running import gush
 
 import coupling
 from coupling.commands.describe import describe
@@ -229,7 +229,7 @@ def test_lost_workers_cost_only_their_case(tmp_path, monkeypatch):
 def test_script_without_a_guard_runs_its_study_in_processes_and_in_silence(tmp_path):
     script = tmp_path / "mine.py"
     script.write_text(
-        f"import sys\nsys.path.insert(0, {str(Path(__file__).parent.parent)!r})\n"
+        f"import sys\nsys.path.insert(0, {str(Path(__file__).parents[2])!r})\n"
         "import coupling\nfrom verification.small_event import COARSE\n"
         "fixed = {f'discretisation.{name}': value for name, value in COARSE.items()}\n"
         "fixed |= {'numerics.relaxation_tolerance': 1e-3, 'stop.time': 0.01, 'stop.inflow_mass': 1.0}\n"

@@ -12,7 +12,7 @@ import pytest
 
 import coupling.postprocess
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 PACKAGES = ("mpm", "structure", "coupling")
 #: Modules whose plain functions people call in scripts and notebooks.
 MODULES = (

@@ -134,7 +134,6 @@ def test_killed_writer_leaves_a_readable_file(tmp_path):
     path = tmp_path / "run.nc"
     code = f"""
 import os, sys
-sys.path.insert(0, {str(__file__.rpartition("/")[0])!r})
 from verification.synthetic_run import make_quick_scene, record
 import coupling
 from coupling import datasets

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 FORBIDDEN = {
     "mpm": {"structure", "coupling", "verification", "xarray", "matplotlib", "skfem", "h5netcdf"},
     "structure": {"mpm", "coupling", "verification"},

@@ -11,7 +11,7 @@ import pytest
 from structure import BeamSpringLining, Ring, theory
 from structure.lining import RESPONSE
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
-from test_cli import gush
-from test_lining_models import LIMITS, written  # noqa: F401
+from running import gush
+from test_lining_models import LIMITS
 
 from coupling.datasets import read_response
 from verification.synthetic_run import write_run
@@ -34,7 +34,7 @@ def test_comparison_leaves_the_run_as_it_is(folder, tmp_path):
         assert stored.attrs["gate_cut"] == 0.17
 
 
-def test_response_to_own_pressures_leaves_their_file_as_it_is(written, tmp_path):  # noqa: F811
+def test_response_to_own_pressures_leaves_their_file_as_it_is(written, tmp_path):
     (tmp_path / "limits.toml").write_text(LIMITS)
     before = contents(tmp_path)
     assert gush("respond", written, "--limits", tmp_path / "limits.toml").exit_code == 0
@@ -57,7 +57,7 @@ def test_response_of_another_ring_does_not_take_the_place_of_the_runs_own(folder
         assert float(abs(stored["bending_moment"] - own.values).max()) > 1e3
 
 
-def test_response_asks_before_it_replaces(written, tmp_path):  # noqa: F811
+def test_response_asks_before_it_replaces(written, tmp_path):
     target = tmp_path / "mine-beam-spring.nc"
     target.write_text("somebody's")
     refused = gush("respond", written)
@@ -68,7 +68,7 @@ def test_response_asks_before_it_replaces(written, tmp_path):  # noqa: F811
     assert own.exit_code == 2 and "must not be the file of the pressures" in own.output
 
 
-def test_comparison_replaces_earlier_comparisons_only(written, tmp_path):  # noqa: F811
+def test_comparison_replaces_earlier_comparisons_only(written, tmp_path):
     out = tmp_path / "out"
     out.mkdir()
     (out / "forces.png").write_text("somebody's")

@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 import pytest
 import xarray as xr
-from test_cli import gush
+from running import gush
 
 import coupling
 import structure

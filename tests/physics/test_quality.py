@@ -4,7 +4,6 @@ import re
 
 import numpy as np
 import pytest
-from test_cli import simulated  # noqa: F401
 from test_gushing import event, quick  # noqa: F401
 from test_heap import dropped_block
 
@@ -157,7 +156,7 @@ def test_knobs_that_remedies_name_are_of_the_scene():
             assert hasattr(getattr(scene, table), knob), knob
 
 
-def test_quality_is_in_the_file_the_log_and_the_line(simulated, tmp_path):  # noqa: F811
+def test_quality_is_in_the_file_the_log_and_the_line(simulated, tmp_path):
     folder = tmp_path / "run"
     run(make_quick_scene(), folder, figures=True)
     values = quality(read_history(folder), read_response(folder))

@@ -26,7 +26,7 @@ import structure
 import structure.models
 from coupling.cli import app
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 PAGES = ["README.md", "CONTRIBUTING.md", *(str(p.relative_to(ROOT)) for p in sorted((ROOT / "docs").rglob("*.md")))]
 TUTORIAL = "docs/tutorial.md"
 TITLE = re.compile(r'title="([^"]*)"')

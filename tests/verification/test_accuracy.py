@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
-from test_cli import gush
+from running import gush
 
 import coupling
 from verification.accuracy.ladder_report import write_ladder

@@ -124,7 +124,7 @@ def test_limits_from_toml_are_the_same(tmp_path):
 
 
 def test_limits_in_the_documentation_are_valid(tmp_path):
-    text = (Path(__file__).parent.parent / "docs" / "ring.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[2] / "docs" / "ring.md").read_text(encoding="utf-8")
     path = tmp_path / "limits.toml"
     path.write_text(text.split('```toml title="limits.toml"\n')[1].split("```")[0], encoding="utf-8")
     assert Limits.from_toml(path) == limits()

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 import xarray as xr
-from test_cli import gush
+from running import gush
 
 import coupling
 from coupling.postprocess import with_inflow

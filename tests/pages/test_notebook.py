@@ -11,7 +11,7 @@ import structure
 from coupling.figures import inflow
 from verification.small_event import small_scene
 
-NOTEBOOK = Path(__file__).parent.parent / "examples" / "notebook_run.ipynb"
+NOTEBOOK = Path(__file__).parents[2] / "examples" / "notebook_run.ipynb"
 
 
 @pytest.fixture(scope="module")
