@@ -151,7 +151,7 @@ def main():
         "it holds.",
         "",
         "Levels follow the mesh, so steps of two meshes do not compare one by one: with a sink the finest level holds "
-        f"fewer points and takes a shorter step ({1e6 * by_name['sink']['dt']:.0f} us, {by_name['sink']['levels']} "
+        f"fewer points and its step is another one ({1e6 * by_name['sink']['dt']:.0f} us, {by_name['sink']['levels']} "
         f"levels) than in the full scene ({1e6 * by_name[FULL]['dt']:.0f} us, {by_name[FULL]['levels']} levels), which "
         "says nothing about the cost of a simulated second.",
     ]
