@@ -9,7 +9,9 @@ import coupling.datasets
 import mpm
 import mpm.scene
 from coupling.scenes.features import features
+from mpm.clock import Clock
 from mpm.contact import one_velocity_kernel, solve_nodes
+from mpm.system import Medium, Net, System, Tally, Walls
 from mpm.variables import (
     B_D,
     B_FLX,
@@ -182,11 +184,19 @@ def test_wall_pushes_an_undrained_mixture_as_two_tied_phases():
         if mixed:
             given[0, :, [B_PSX, B_PSY]] = speed * (sums[0, :, B_MS] + sums[0, :, B_MN])
         nodes, impulse, ledger = np.zeros((n, NODE_WIDTH)), np.zeros((n, 5)), np.zeros(len(LEDGER))
-        numba.njit(error_model="numpy")(solve.py_func)(  # a kernel's part has no code of its own to call
-            0, n, row, np.full(n, -1, np.int32), np.zeros(n, np.int8), 0, np.array([1e-3]),
-            np.ones((1, n), np.uint8), given, np.zeros((0, 6)), 9.81, np.zeros(n, np.int8), row,
-            normal, np.ones(n, np.int8), np.full(n, 0.2), None, nodes, np.zeros(n, np.int8), impulse, ledger,
-        )  # fmt: skip
+        system = System(**dict.fromkeys(System._fields) | {
+            "net": Net(**dict.fromkeys(Net._fields) | {
+                "which_node": row, "next_row": np.full(n, -1, np.int32), "level_of_row": np.zeros(n, np.int8),
+                "touched": np.ones((1, n), np.uint8), "sums": given, "tied_means": np.zeros((0, 6)), "nodes": nodes,
+                "status": np.zeros(n, np.int8),
+            }),
+            "walls": Walls(np.zeros(n, np.int8), row, normal, np.ones(n, np.int8), np.full(n, 0.2), None, impulse),
+            "clock": Clock(**dict.fromkeys(Clock._fields) | {"dt_of_level": np.array([1e-3])}),
+            "medium": Medium(9.81, 1000.0, 8e7),
+            "tally": Tally(**dict.fromkeys(Tally._fields) | {"ledger": ledger[None]}),
+        })  # fmt: skip
+        # a kernel's part has no code of its own to call
+        numba.njit(error_model="numpy")(solve.py_func)(0, n, 0, 0, None, system)
         assert ledger[6] < 1e-12 * ledger[7]  # reactions explain the change of momentum
         found.append((nodes[:, [V_SX, V_SY]], impulse / 1e-3))
     (two, of_two), (one, of_one) = found
