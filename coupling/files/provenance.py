@@ -7,6 +7,8 @@ from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 
+import mpm
+
 PACKAGES = ("numpy", "numba", "llvmlite", "scipy", "xarray", "h5py", "h5netcdf", "gmsh")
 #: Root attributes, and packages of `versions`, that the bits of a simulation depend on, the processor apart.
 DECISIVE = ("scene", "source", "solver_sha256", "numpy", "numba", "llvmlite")
@@ -49,7 +51,7 @@ def with_history(history, event):
 def solver_sha256():
     """Hash of all sources of the package `mpm`, which compute the mesh and the simulation."""
     digest = hashlib.sha256()
-    home = Path(__file__).resolve().parent.parent / "mpm"
+    home = Path(mpm.__file__).parent
     for file in sorted(home.rglob("*.py")):
         digest.update(f"{file.relative_to(home).as_posix()} {file.stat().st_size}\n".encode() + file.read_bytes())
     return digest.hexdigest()
@@ -88,7 +90,7 @@ def _version(package):
 
 def revision():
     """Commit of the working copy this code runs from, '+changed' when files differ from it; '' outside of one."""
-    home = Path(__file__).resolve().parent.parent
+    home = Path(mpm.__file__).resolve().parents[1]
     if not (home / ".git").exists():
         return ""
     try:

@@ -1,15 +1,18 @@
 """Every dataset opens with plain xarray, follows the CF conventions, and notices when a bit of it was changed."""
 
+import hashlib
 import importlib.util
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 
 import coupling
+import mpm
 from coupling import datasets
 from coupling.files.provenance import PACKAGES
 from coupling.responses import comparison as compare
@@ -88,6 +91,16 @@ def test_everything_to_repeat_a_run_is_inside(run, tmp_path):
     assert coupling.load_scene(tmp_path / "again.toml") == make_quick_scene()
     for name in ("source", "revision", "solver_sha256", "python", "processor", "created", "random_numbers"):
         assert isinstance(attributes[name], str)
+    sources = Path(mpm.__file__).parent
+    digest = hashlib.sha256()
+    for file in sorted(sources.rglob("*.py")):
+        digest.update(f"{file.relative_to(sources).as_posix()} {file.stat().st_size}\n".encode() + file.read_bytes())
+    assert attributes["solver_sha256"] == digest.hexdigest() != hashlib.sha256().hexdigest()
+    if (sources.parent / ".git").exists():  # not where it is installed
+        head = subprocess.run(
+            ["git", "rev-parse", "HEAD"], cwd=sources.parent, capture_output=True, text=True, check=True
+        )
+        assert head.stdout.startswith(attributes["revision"].removesuffix("+changed")) and attributes["revision"]
     assert [entry.split(" ")[0] for entry in attributes["versions"].split(", ")] == list(PACKAGES)
     assert attributes["history"].splitlines()[-1].endswith("/structure/continuum computed")
 
