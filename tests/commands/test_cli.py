@@ -49,6 +49,7 @@ def test_run_writes_everything_and_prints_a_table(simulated, tmp_path):
     assert json.loads((tmp_path / "b.json").read_text())["axial_force"] == data["response"]["axial_force"]
 
 
+@pytest.mark.slow
 def test_poor_error_is_a_warning_with_a_remedy_in_the_run_its_log_and_its_report(simulated, tmp_path, monkeypatch):
     from coupling.postprocess.quality import ERRORS
 
@@ -79,6 +80,7 @@ def test_values_of_the_scene_are_set_on_the_command_line(simulated, tmp_path):
     assert resumed.exit_code == 2 and "--set" in resumed.output
 
 
+@pytest.mark.slow
 def test_ring_that_fails_leaves_the_pictures_of_the_ground_and_says_what_failed(simulated, tmp_path):
     (tmp_path / "loose.toml").write_text(
         'base = "quick"\n[ring]\njoint_rotational_stiffness = 0.0\njoint_normal_stiffness = 0.0\n'
@@ -196,6 +198,7 @@ def test_interrupted_run_keeps_its_output(simulated, tmp_path):
     assert datasets.read_pressures(tmp_path / "a").sizes["time"] == 3
 
 
+@pytest.mark.slow
 def test_ctrl_c_in_a_real_run_leaves_a_readable_file(tmp_path):
     process = subprocess.Popen(
         [sys.executable, "-m", "coupling.cli", "run", "quick", "--out", str(tmp_path / "a"), "--no-figures"],

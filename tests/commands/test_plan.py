@@ -10,6 +10,7 @@ from verification.small_event import COARSE, small_scene
 
 
 @pytest.mark.parametrize("intervals", [1, 4, 10])
+@pytest.mark.slow
 def test_planned_steps_are_those_that_are_run(tmp_path, intervals):
     """Steps are cut so that each output interval takes a whole number of them, in powers of two of the levels."""
     stop = {"time": 0.027, "inflow_mass": 1e9}

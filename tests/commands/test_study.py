@@ -26,6 +26,8 @@ from coupling.studies.progress import CaseProgress, study_state
 from coupling.studies.sensitivity import scatter, sensitivity, tornado
 from verification.small_event import COARSE, small_scene
 
+pytestmark = pytest.mark.slow
+
 K0 = 0.3 / (1 - 0.3)  # of gravity loading in the built-in scenes
 TINY = {
     "name": "tiny",

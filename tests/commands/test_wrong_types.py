@@ -30,8 +30,14 @@ def test_run_says_what_a_scene_is(scene, parts, tmp_path):
 
 
 def test_run_takes_the_name_of_a_scene():
-    # planned alike, and refused only for what comes after the scene
-    assert rough_plan("quick") == rough_plan(coupling.load_scene("quick"))
+    # planned alike but for the memory of the moment, and refused only for what comes after the scene
+    by_name, by_scene = (
+        {
+            key: value for key, value in rough_plan(scene).items() if key != "free_memory_bytes"
+        }  # it changes by the moment
+        for scene in ("quick", coupling.load_scene("quick"))
+    )
+    assert by_name == by_scene
     with pytest.raises(Refused, match="is a file"):
         coupling.run("quick", __file__)
 

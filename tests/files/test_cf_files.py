@@ -64,6 +64,7 @@ NO_CHECKER = importlib.util.find_spec("compliance_checker") is None
 
 
 @pytest.mark.skipif(NO_CHECKER, reason="needs the package compliance-checker")
+@pytest.mark.slow
 def test_every_dataset_passes_the_cf_check(run, tmp_path):
     paths = [flat(run, group, tmp_path / f"{group.replace('/', '-')}.nc") for group in GROUPS]
     source = read_source(run)

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time as clock
 
+import pytest
 from typer.testing import CliRunner
 
 from coupling import cli
@@ -13,6 +14,7 @@ from coupling.datasets import RunFileError, read_attributes, read_history
 from verification.small_event import small_scene
 
 
+@pytest.mark.slow
 def test_killed_run_is_interrupted_and_offers_to_resume(tmp_path):
     scene, out = tmp_path / "small.toml", tmp_path / "run"
     scene.write_text(small_scene(stop={"time": 4000.0, "inflow_mass": 1e9}, output={"interval": 0.005}).source)

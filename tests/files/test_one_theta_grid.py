@@ -98,6 +98,7 @@ def test_response_in_a_file_of_an_earlier_version_is_read_at_the_angles_of_the_p
     np.testing.assert_array_equal(read["joint_opening"], response["joint_opening"])
 
 
+@pytest.mark.slow
 def test_studies_have_pressures_and_forces_at_the_same_angles_also_those_of_earlier_versions(tmp_path, monkeypatch):
     folder = write_study(tmp_path / "study", monkeypatch)
     study = coupling.read_study(folder).load()

@@ -9,6 +9,8 @@ import mpm
 import mpm.scene
 from coupling import postprocess
 
+pytestmark = pytest.mark.slow
+
 
 def history(times, masses):
     return xr.Dataset({"inflow_mass": ("time", masses), "flow_zone_area": ("time", 2.0 * np.array(masses))},

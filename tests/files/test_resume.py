@@ -23,6 +23,8 @@ from coupling.refused import Refused
 from coupling.runs.rerun import compare_bits
 from verification.small_event import small_scene
 
+pytestmark = pytest.mark.slow
+
 OFTEN = {"checkpoint_interval": 0.0}  # the time that checkpoints may take is limited too: some ten of them
 KILLED = 9
 

@@ -25,6 +25,7 @@ def openings(monkeypatch):
     return found
 
 
+@pytest.mark.slow
 def test_run_with_forces_and_pictures_opens_its_file_five_times_beside_the_batches(openings, tmp_path, monkeypatch):
     monkeypatch.setattr(datasets.writer, "SECONDS_BETWEEN_WRITES", 1e9)  # one batch: the first record
     scene = tmp_path / "small.toml"

@@ -12,6 +12,8 @@ import pytest
 
 import coupling.postprocess
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("mpm", "structure", "coupling")
 #: Modules whose plain functions people call in scripts and notebooks.

@@ -26,6 +26,8 @@ import structure
 import structure.models
 from coupling.cli import app
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 PAGES = ["README.md", "CONTRIBUTING.md", *(str(p.relative_to(ROOT)) for p in sorted((ROOT / "docs").rglob("*.md")))]
 TUTORIAL = "docs/tutorial.md"

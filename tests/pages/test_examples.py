@@ -11,6 +11,8 @@ import pytest
 from structure import BeamSpringLining, Ring, theory
 from structure.lining import RESPONSE
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
 

@@ -11,6 +11,8 @@ import structure
 from coupling.figures import inflow
 from verification.small_event import small_scene
 
+pytestmark = pytest.mark.slow
+
 NOTEBOOK = Path(__file__).parents[2] / "examples" / "notebook_run.ipynb"
 
 

@@ -13,6 +13,8 @@ from coupling.files.provenance import root_attributes
 from coupling.report import page, series
 from verification.synthetic_run import record, write_run
 
+pytestmark = pytest.mark.slow
+
 pytestmark = pytest.mark.skipif(
     find_browser() is None, reason="no Chromium on this machine; Debian: apt-get install chromium-headless-shell"
 )

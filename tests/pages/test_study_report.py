@@ -16,6 +16,8 @@ from coupling.report import page, study_markup, study_numbers, study_page, study
 from coupling.report.packing import unpacked
 from coupling.studies.collect import stored_cases
 
+pytestmark = pytest.mark.slow
+
 STATE = """Object.fromEntries([...document.querySelectorAll('[data-chart]')].map(f =>
   [f.dataset.chart, f.querySelector('svg').innerHTML])
   .concat(['now-table', 'now'].map(id => [id, document.getElementById(id).innerText])))"""

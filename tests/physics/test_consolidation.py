@@ -4,6 +4,8 @@ import pytest
 
 from verification.problems.columns import terzaghi
 
+pytestmark = pytest.mark.slow
+
 
 def consolidate(cells, conductivity, bulk_modulus, time_factor, **settings):
     """Profile error over the initial excess pressure, and largest time step [s]."""

@@ -7,6 +7,8 @@ import coupling
 from coupling import cli
 from verification.small_event import COARSE
 
+pytestmark = pytest.mark.slow
+
 GATELESS = {
     "gate": "none", "discretisation": COARSE, "stop": {"time": 0.02, "inflow_mass": 1e9}, "output": {"interval": 0.01},
     "tunnels.0.friction_coefficient": 0.6,  # bears the K0 state: of that there is a theory

@@ -11,6 +11,8 @@ from mpm.variables import SXX, SXY, VLY, VSX, X0, Y0, P, Y
 from verification.small_event import COARSE
 from verification.stability.amplification import Column
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def closed_case_3():

@@ -13,6 +13,8 @@ import mpm.solver
 from mpm.simulation import STEPS_BETWEEN_CHECKS
 from mpm.variables import MASS, VSX, VSY, X, Y
 
+pytestmark = pytest.mark.slow
+
 
 def quick(**changes):
     return coupling.load_scene("quick").mpm.model_copy(update=changes)

@@ -12,6 +12,8 @@ from mpm.mesh import Mesh, areas
 from mpm.variables import SYY, VSX, P
 from verification.small_event import COARSE, small_scene
 
+pytestmark = pytest.mark.slow
+
 # Sums at the nodes are the same up to their order; the event multiplies their last bits by some 1e3 in a hundred steps.
 ROUND_OFF = 1e-11
 EVENT = 1e-7

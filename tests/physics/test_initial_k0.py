@@ -18,6 +18,8 @@ from mpm.points import fill, initial_stress
 from mpm.variables import SXX, SXY, SYY, SZZ, VLY, VSX, P, Y
 from verification.small_event import COARSE, small_scene
 
+pytestmark = pytest.mark.slow
+
 BUOYANT = 0.55 * (2650.0 - 1000.0) * 9.81
 NEVER_YIELDS = {"friction_angle": 25.0, "cohesion": 0.0, "poissons_ratio": 0.3}
 LOOSE_SAND = {"friction_angle": 20.0, "cohesion": 0.0, "poissons_ratio": 0.15}

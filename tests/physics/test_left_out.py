@@ -45,6 +45,8 @@ from mpm.variables import (
 )  # fmt: skip
 from verification.small_event import small_scene
 
+pytestmark = pytest.mark.slow
+
 MOTION = [X, Y, VSX, VSY, EQ]
 STRESS = [SXX, SYY, SZZ, SXY]
 

@@ -191,6 +191,7 @@ def test_quality_reports_the_smallest_altitude(quick_mesh):
 
 
 @pytest.mark.parametrize("name", ["case-1", "case-2", "case-3", "case-4", "case-5", "case-9", "quick", "twin-tunnels"])
+@pytest.mark.slow
 def test_built_in_scenes_have_no_flat_triangle_and_the_gate_sets_the_smallest(name):
     scene = coupling.load_scene(name).mpm
     mesh = build_mesh(scene)
@@ -406,6 +407,7 @@ COARSE = {"element_size": 4.0, "element_size_lining": 0.8, "element_size_interio
     interior=st.sampled_from(["resolved", "sink"]),
     coarse=st.booleans(),
 )
+@pytest.mark.slow
 def test_any_gate_can_be_meshed(quick_scene, angle, width, across, interior, coarse):
     sizes = {"elements_across_gate": across} | (COARSE if coarse else {})
     scene = changed(quick_scene.mpm, gate={"angle": angle, "width": width}, discretisation=sizes, interior=interior)

@@ -15,6 +15,8 @@ from mpm.wall import NODE_STATE, reaction_kernel
 from verification.problems import exact_rings
 from verification.small_event import small_scene
 
+pytestmark = pytest.mark.slow
+
 MODULUS, NU, DENSITY = 34.5e9, 0.2, 2548.0
 THETA = np.radians(np.arange(0.0, 360.0, 3.0))
 

@@ -26,6 +26,8 @@ from mpm.variables import MASS, Y0
 from verification.small_event import small_scene
 from verification.synthetic_run import make_quick_scene
 
+pytestmark = pytest.mark.slow
+
 
 def test_fall_turns_the_work_of_gravity_into_motion():
     solver = dropped_block()

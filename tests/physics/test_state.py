@@ -10,6 +10,8 @@ import mpm.solver
 from mpm.state import ARRAYS, NUMBERS
 from verification.small_event import small_scene
 
+pytestmark = pytest.mark.slow
+
 #: Attributes of a solver that its state leaves out: built from scene and mesh, or by sorting the points.
 BUILT = {
     "scene", "mesh", "soils", "parts", "geometry", "neighbours", "fixed", "contact_of_node", "n_contact", "normal",

@@ -10,6 +10,8 @@ from mpm.scene import Scene
 from mpm.solver import Solver
 from mpm.variables import B_FLX, B_FLY, B_FX, B_FY, CLAMPS, SXX, SXY, SYY, SZZ, VLX, VLY, VSX, VSY, N, P, X, Y
 
+pytestmark = pytest.mark.slow
+
 
 def full_box(drainage="two-phase", **numerics):
     """A closed box full of weightless sand and water without stress, 2 m by 1 m."""

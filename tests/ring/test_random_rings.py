@@ -22,6 +22,8 @@ from verification.robustness.random_rings import (
     sums,
 )
 
+pytestmark = pytest.mark.slow
+
 SOIL = dict(youngs_modulus=40e6, poissons_ratio=0.3, cohesion=0.0, friction_angle=25.0, vertical_stress=2.07e5,
             horizontal_stress=8.9e4)  # fmt: skip
 

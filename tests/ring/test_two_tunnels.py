@@ -18,6 +18,8 @@ from coupling.scenes.plausibility import warnings_of
 from coupling.scenes.rings import ring_of
 from verification.small_event import COARSE
 
+pytestmark = pytest.mark.slow
+
 GATE = 1
 
 

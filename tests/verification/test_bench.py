@@ -13,6 +13,8 @@ from verification.speed.command import bench
 from verification.speed.sizes import slope
 from verification.speed.stepping import configurations, kernel_times, prepared
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def solver():

@@ -18,6 +18,8 @@ from verification.published.sensitivity_figure import changes, sensitivity_figur
 from verification.published.sources import at_study_inflow, published_numbers
 from verification.small_event import COARSE
 
+pytestmark = pytest.mark.slow
+
 FIXED = {f"discretisation.{name}": value for name, value in COARSE.items()} | {
     "numerics.relaxation_tolerance": 1e-3,
     "stop.inflow_mass": 40.0,

@@ -12,6 +12,8 @@ from verification.stability.extremes import BUG, STABLE, Case, judge, judge_apar
 from verification.stability.linear import critical_map
 from verification.stability.trials import box_of, box_scene
 
+pytestmark = pytest.mark.slow
+
 REPRESENTATIVE = [name for name, case in cases().items() if case.representative]
 COLUMNS = {
     "as it is": {},

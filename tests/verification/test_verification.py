@@ -9,6 +9,8 @@ from verification.accuracy.orders import observed_order
 from verification.problems import problems
 from verification.problems.exact_plasticity import exact_path, stiffness, yield_planes
 
+pytestmark = pytest.mark.slow
+
 MINE = list(problems().values())
 
 
