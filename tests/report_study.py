@@ -1,7 +1,7 @@
 """A study of synthetic runs, run by the program's own study command: for tests of its page."""
 
-import sys
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 
@@ -31,7 +31,7 @@ def synthetic_run(scene, folder, **_):
 
 def write_study(folder, monkeypatch, backends=("beam-spring", "continuum"), **changes):
     """Run the study of two gates and two soils into a folder; `changes` of its definition."""
-    monkeypatch.setattr(sys.modules["coupling.runs.run"], "run", synthetic_run)
+    monkeypatch.setattr(import_module("coupling.runs.run"), "run", synthetic_run)
     plan = {
         "name": "gates", "scene": "quick", "records": 5, "backends": backends, "fixed": {"stop.inflow_mass": 300.0},
         "parameters": {"gate.angle": [90.0, 45.0], "soils.0.friction_angle": [25.0, 35.0]}, **changes,

@@ -177,7 +177,7 @@ def test_truncated_run_is_refused(simulated, tmp_path):
 
 
 def test_too_little_memory_is_refused(monkeypatch):
-    monkeypatch.setattr(sys.modules["coupling.runs.memory"], "free_memory_bytes", lambda: 1_000_000)
+    monkeypatch.setattr("coupling.runs.memory.free_memory_bytes", lambda: 1_000_000)
     with pytest.raises(Refused, match="raise element_size"):
         check_memory(make_quick_scene().mpm)
 
