@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mpm.element_size import size_callback
-from mpm.jit import kernel
+from mpm.machine.compile import kernel
 from mpm.mesh import MeshError
 
 if TYPE_CHECKING:

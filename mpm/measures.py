@@ -2,32 +2,9 @@
 
 import numpy as np
 
+from mpm.fields import numbers
 from mpm.half_model import with_mirrored_points
 from mpm.points import mass_inside
-from mpm.variables import (
-    LEDGER,
-    MASS,
-    MODEL_ELASTIC,
-    POINT_VARIABLES,
-    S_G,
-    S_LOOSE,
-    S_MODEL,
-    S_TENSION,
-    SXX,
-    SXY,
-    SYY,
-    SZZ,
-    VLX,
-    VLY,
-    VSX,
-    VSY,
-    X0,
-    Y0,
-    N,
-    P,
-    X,
-    Y,
-)
 
 #: Displacement beyond which a point belongs to the flow zone, and to the disturbed zone [m].
 FLOWS, DISTURBED = 0.05, 0.01
@@ -47,10 +24,10 @@ class Measures:
         return len(self.points)
 
     def nodal_sums(self):
-        """What the points were last mapped to at the nodes: (n_nodes, 13) float64, columns `B_` of variables."""
-        rows, n = self.sums.sum(axis=0), len(self.mesh.nodes)
+        """What the points were last mapped to at the nodes: (n_nodes,) records of `mpm.fields.NODAL_SUM`."""
+        rows, n = numbers(self.sums).sum(axis=0), len(self.mesh.nodes)
         np.add.at(rows, self.levels.node_of_row[n:], rows[n:])
-        return rows[:n]
+        return rows[:n].view(self.sums.dtype)[:, 0]
 
     def memory_bytes(self):
         """Bytes held in the arrays of the solver."""
@@ -60,7 +37,7 @@ class Measures:
 
     def points_by_name(self):
         """Copy of the state of all points, one array a variable, with volume, displacement and soil number."""
-        data = {name: self.points[:, k].copy() for k, (name, _, _) in enumerate(POINT_VARIABLES)}
+        data = {name: self.points[name].copy() for name in self.points.dtype.names}
         data["displacement_x"] = data["x"] - data.pop("x_initial")
         data["displacement_y"] = data["y"] - data.pop("y_initial")
         data["volume"] = self._volumes()
@@ -70,7 +47,7 @@ class Measures:
 
     def _volumes(self):
         rho = np.array([s.grain_density for s in self.scene.soils])[self.soil_of_point]
-        return self.points[:, MASS] / (rho * (1 - self.points[:, N]))
+        return self.points["grain_mass"] / (rho * (1 - self.points["porosity"]))
 
     def inflow_mass(self, within=0.0):
         """Grains inside the gate's tunnel, those taken out included [kg/m].
@@ -94,9 +71,11 @@ class Measures:
         of it.
         """
         rows, wet = self.points, self._pore_water()
-        mass = rows[:, MASS]
+        mass = rows["grain_mass"]
         # sums, no dot products: those of BLAS depend on its number of threads in the last bits
-        momentum = [np.sum(mass * rows[:, s] + wet * rows[:, w]) for s, w in ((VSX, VLX), (VSY, VLY))]
+        momentum = [
+            np.sum(mass * rows[f"velocity_solid_{axis}"] + wet * rows[f"velocity_liquid_{axis}"]) for axis in "xy"
+        ]
         return {
             "momentum": np.array(momentum),
             "kinetic": float(np.sum(self._kinetic_energies(wet))),
@@ -105,20 +84,22 @@ class Measures:
 
     def _pore_water(self):
         """Water that fills the pores of every point at zero pressure [kg/m]; zero in a dry scene."""
-        return self._water_density * self.points[:, N] * self._volumes()
+        return self._water_density * self.points["porosity"] * self._volumes()
 
     def _held_water(self, wet):
         """The same with what its pressure has squeezed in, or without what is missing."""
-        return wet * (1 + self.points[:, P] / self._water_modulus) if self._water_modulus > 0 else wet
+        return wet * (1 + self.points["pore_pressure"] / self._water_modulus) if self._water_modulus > 0 else wet
 
     def _kinetic_energies(self, wet):
-        grains = self.points[:, VSX] ** 2 + self.points[:, VSY] ** 2
-        water = self.points[:, VLX] ** 2 + self.points[:, VLY] ** 2
-        return 0.5 * (self.points[:, MASS] * grains + wet * water)
+        return 0.5 * (self.points["grain_mass"] * self.speeds("solid") ** 2 + wet * self.speeds("liquid") ** 2)
+
+    def speeds(self, phase):
+        """Speed of a phase, "solid" or "liquid", of every point [m/s]."""
+        return np.hypot(self.points[f"velocity_{phase}_x"], self.points[f"velocity_{phase}_y"])
 
     def _moved(self):
         """Displacement of every point [m]."""
-        return np.hypot(self.points[:, X] - self.points[:, X0], self.points[:, Y] - self.points[:, Y0])
+        return np.hypot(*(self.points[axis] - self.points[f"{axis}_initial"] for axis in "xy"))
 
     def balances(self):
         """How far the state of the points is from what was done to them, as a dict of floats.
@@ -133,7 +114,8 @@ class Measures:
             reactions do not explain, over their sum; largest_courant [-]: time step over the critical one of the state
             it led to; and the `flow_amounts` that these are compared with.
         """
-        ledger, now = dict(zip(LEDGER, self.ledger.sum(axis=0).tolist(), strict=True)), self.sums_over_points()
+        ledger = {name: float(self.ledger[name].sum()) for name in self.ledger.dtype.names}
+        now = self.sums_over_points()
         received = np.array([ledger["momentum_x"], ledger["momentum_y"]])
         departure = np.abs(now["momentum"] - self.initial["momentum"] - received)
         if self.scene.is_half:
@@ -168,12 +150,11 @@ class Measures:
         """
         wet, volume, flows = self._pore_water(), self._volumes(), self._moved() > FLOWS
         held, element = self._held_water(wet), self.element_of_point
-        grains, water = (np.hypot(self.points[:, x], self.points[:, y]) for x, y in ((VSX, VSY), (VLX, VLY)))
-        momenta = self.points[:, MASS] * grains + wet * water
+        momenta = self.points["grain_mass"] * self.speeds("solid") + wet * self.speeds("liquid")
         past = self._past_the_gate()
         inside, flows_inside = element >= 0, flows & (element >= 0)
         cell = element // 4
-        area = self.geometry[:, 6].reshape(-1, 4).sum(axis=1)
+        area = self.geometry["area"].reshape(-1, 4).sum(axis=1)
         in_cell, flowing = (np.bincount(cell[k], volume[k], len(area)) for k in (inside, flows_inside))
         beyond = np.maximum(in_cell - area, 0.0)
         beyond[beyond < ROUNDING * area] = 0.0
@@ -196,15 +177,15 @@ class Measures:
             return 0.0
         tunnel = self.scene.tunnels[self.scene.gate.tunnel]
         gate = tunnel.outer_radius * np.cos(np.radians(self.scene.gate.angle)) - tunnel.axis_depth
-        fall = np.maximum(gate - self.points[past, Y], 0.0)
-        return np.sum((self.points[past, MASS] + wet[past]) * fall) * self.scene.gravity
+        fall = np.maximum(gate - self.points["y"][past], 0.0)
+        return np.sum((self.points["grain_mass"][past] + wet[past]) * fall) * self.scene.gravity
 
     def _past_the_gate(self):
         """Whether a point is inside the outer face of the gate's tunnel, or was taken out there."""
         if self.scene.gate is None:
             return np.zeros(self.n_points, bool)
         tunnel = self.scene.tunnels[self.scene.gate.tunnel]
-        away = np.hypot(self.points[:, X] - tunnel.x, self.points[:, Y] + tunnel.axis_depth)
+        away = np.hypot(self.points["x"] - tunnel.x, self.points["y"] + tunnel.axis_depth)
         return (away < tunnel.outer_radius) | (self.element_of_point < 0)
 
     def tip_fraction(self):
@@ -213,20 +194,20 @@ class Measures:
         Their grains touch without being pressed together: they bear no more tension than the soil has strength.
         """
         soil, rows = self.soils[self.soil_of_point], self.points
-        centre = 0.5 * (rows[:, SXX] + rows[:, SYY])
-        radius = np.hypot(0.5 * (rows[:, SXX] - rows[:, SYY]), rows[:, SXY])
-        largest = np.maximum(centre + radius, rows[:, SZZ])
-        size = np.abs(centre) + radius + np.abs(rows[:, SZZ])
-        at_tip = (largest >= soil[:, S_TENSION] - ROUNDING * (size + soil[:, S_G])) & (rows[:, N] < soil[:, S_LOOSE])
-        at_tip &= (soil[:, S_MODEL] != MODEL_ELASTIC) & (self.element_of_point >= 0)
+        xx, yy, zz, xy = (rows[f"stress_{name}"] for name in ("xx", "yy", "zz", "xy"))
+        centre, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
+        largest = np.maximum(centre + radius, zz)
+        size = np.abs(centre) + radius + np.abs(zz)
+        size += soil["shear"] if "shear" in soil.dtype.names else 0.0
+        at_tip = (largest >= soil["tension"] - ROUNDING * size) & (rows["porosity"] < soil["loose_porosity"])
+        at_tip &= np.isfinite(soil["tension"]) & (self.element_of_point >= 0)
         return float(np.count_nonzero(at_tip)) / max(self.n_active, 1)
 
     def measures(self):
         """Zones, balances and extremes of the state at hand, as a dict of floats."""
         moved = self._moved()
         flow = moved > FLOWS
-        mass = self.points[:, MASS]
-        speed2 = self.points[:, VSX] ** 2 + self.points[:, VSY] ** 2
+        mass, speed = self.points["grain_mass"], self.speeds("solid")
         active = self.element_of_point >= 0
         return {
             "inflow_mass": self.inflow_mass(),
@@ -235,8 +216,8 @@ class Measures:
             "grain_mass": self.copies * float(np.sum(mass)),
             "suspended_fraction": float(self.suspended) / max(self.n_active, 1),
             "tip_fraction": self.tip_fraction(),
-            "kinetic_energy": self.copies * float(0.5 * np.sum((mass * speed2)[active])),
-            "max_velocity": float(np.sqrt(speed2[active].max(initial=0.0))),
+            "kinetic_energy": self.copies * float(0.5 * np.sum((mass * speed**2)[active])),
+            "max_velocity": float(speed[active].max(initial=0.0)),
         }
 
     def lining_pressures(self, duration):
@@ -249,7 +230,7 @@ class Measures:
         """
         result = []
         for part in self.lining:
-            impulse = self.impulse[part.rows] * part.factors / duration
+            impulse = numbers(self.impulse)[part.rows] * part.factors / duration
             bears = part.bears if self.gate_open else np.ones(len(part.arc), bool)
             arc = part.arc
             mean_s, mean_l, shear = (np.where(bears, impulse[:, k] / arc, 0.0) for k in range(3))

@@ -8,21 +8,16 @@ left out; numerical ones may have one.
 
 import math
 import os
-import re
-from functools import cache, cached_property, partial
+from functools import cached_property
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, SerializeAsAny, WrapValidator, model_validator
 
-#: A number and a unit: letters with a one-digit exponent at most, joined by *, / or a space. Nothing is evaluated: left
-#: to itself pint would compute "9**9**9**9 m".
-_UNIT = r"(?:[^\W\d_]|[°%])+(?:(?:\*\*|\^)?-?[0-9])?"
-_QUANTITY = re.compile(
-    rf"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*"
-    rf"((?:1?\s*/\s*)?{_UNIT}(?:\s*[*/·]\s*{_UNIT}|\s+{_UNIT})*)\s*"
-)
-_DECIMAL_COMMA = re.compile(r"([0-9]),([0-9])")
+from mpm.laws.law import soil_of_its_law
+from mpm.laws.soil import Soil
+from mpm.quantities import Acceleration, Angle, Density, Length, Mass, Part, Pressure, Time, in_unit
+
 MOST_RECORDS = 1_000_000
 #: Growth of the element size per metre above which neighbouring quadrilaterals are no longer near squares.
 STEEPEST = 0.25
@@ -31,59 +26,6 @@ _HOUR = 3600.0
 ROUNDING = 1e-9
 #: Smallest (outer - inner) / outer diameter: the channel through a thinner lining has no length to mesh.
 MOST_SLENDER = 0.01
-
-
-@cache
-def _unit_registry():
-    import pint  # loaded only where a scene uses strings with units
-
-    return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
-
-
-def quantity_in(unit: str, value: Any) -> Any:
-    """A string with a unit as the number in `unit`, converted by pint; anything else as it is.
-
-    Raises
-    ------
-    ValueError
-        No quantity, or of another dimension: rule, value, remedy.
-    """
-    if not isinstance(value, str):
-        return value
-    given, why = value if len(value) <= 40 else f"{value[:40]}..", ""
-    if _DECIMAL_COMMA.search(given):
-        point = _DECIMAL_COMMA.sub(r"\1.\2", given)
-        raise ValueError(f"must have a decimal point, got {given!r} with a comma; write it like {point!r}")
-    parts = _QUANTITY.fullmatch(value) if len(value) <= 60 else None
-    if parts is not None:
-        text = re.sub(r"(?:\*\*|\^)?(-?[0-9])", r"**\1", parts[2].replace("·", "*").removeprefix("1").lstrip())
-        try:
-            quantity = _unit_registry().Quantity(float(parts[1]), f"1{text}" if text.startswith("/") else text)
-            return quantity.to(unit).magnitude
-        except Exception as error:
-            why = f": {error}"
-    raise ValueError(f"must be a quantity in {unit}, got {given!r}{why}; write it like '20 {unit}'")
-
-
-def in_unit(unit: str) -> BeforeValidator:
-    """Lets a float field in `unit` also take a string with a unit, see :func:`quantity_in`."""
-    return BeforeValidator(partial(quantity_in, unit))
-
-
-Length = Annotated[float, in_unit("m")]
-Pressure = Annotated[float, in_unit("Pa")]
-Density = Annotated[float, in_unit("kg/m**3")]
-Angle = Annotated[float, in_unit("degree")]
-Velocity = Annotated[float, in_unit("m/s")]
-Time = Annotated[float, in_unit("s")]
-Mass = Annotated[float, in_unit("kg/m")]
-Acceleration = Annotated[float, in_unit("m/s**2")]
-
-
-class Part(BaseModel):
-    """A part of a scene: immutable, unknown keys refused, infinities and NaN refused."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class Box(Part):
@@ -114,130 +56,8 @@ class Water(Part):
     drainage: Literal["two-phase", "undrained"] = "two-phase"
 
 
-class Soil(Part):
-    """One soil layer, from `top_depth` down to the next layer or the bottom.
-
-    Parameters
-    ----------
-    relaxation_time : float
-        In which stress beyond the strength falls by 1/e [s] (Duvaut & Lions 1972); 0: at once, perfectly plastic. Where
-        soil shears at a rate e' it bears 2 G e' times this time more, and slip lines get a width. Not in the drained
-        initial state.
-    k0 : float or None
-        Horizontal over vertical effective stress of the initial state [-]. None: what loading an elastic body by
-        gravity gives, see :meth:`lateral_pressure_coefficient`.
-    """
-
-    name: str = Field(max_length=60, pattern=r"^\w[\w .,()+-]*$")  # it is shown in tables, pages and pictures
-    top_depth: Length = Field(ge=0)
-    model: Literal["mohr-coulomb", "elastic"]
-    youngs_modulus: Pressure = Field(ge=1e4, le=1e11)
-    poissons_ratio: float = Field(ge=0, lt=0.5)
-    cohesion: Pressure = Field(ge=0, le=1e8)
-    friction_angle: Angle = Field(ge=0, lt=60)
-    dilatancy_angle: Angle = Field(ge=0, lt=60)
-    tensile_strength: Pressure = Field(default=0.0, ge=0, le=1e8)
-    porosity: float
-    loose_porosity: float
-    relaxation_time: Time = Field(default=0.0, ge=0, le=1)
-    grain_density: Density = Field(gt=1000, lt=10000)
-    hydraulic_conductivity: Velocity | None = None
-    k0: float | None = Field(default=None, gt=0, lt=5)
-
-    @field_validator("porosity")
-    @classmethod
-    def _check_porosity(cls, porosity, given):
-        if not 0.05 < porosity < 0.9:
-            raise ValueError(
-                f"{_soil(given)}: porosity must lie in (0.05, 0.9), got {porosity:g}; give a fraction, not percent"
-            )
-        return porosity
-
-    @field_validator("hydraulic_conductivity")
-    @classmethod
-    def _check_conductivity(cls, conductivity, given):
-        if conductivity is not None and not 0 < conductivity <= 10:
-            raise ValueError(
-                f"{_soil(given)}: hydraulic_conductivity must lie in (0, 10] m/s, got {conductivity:g}; "
-                "give the Darcy conductivity in m/s, sand about 1e-4"
-            )
-        return conductivity
-
-    @model_validator(mode="after")
-    def _check(self):
-        who = f"soil '{self.name}'"
-        if not self.porosity < self.loose_porosity <= 0.9:
-            raise ValueError(
-                f"{who}: loose_porosity (above it grains do not touch) must lie between porosity "
-                f"{self.porosity:g} and 0.9, got {self.loose_porosity:g}; raise it"
-            )
-        if self.dilatancy_angle > self.friction_angle:
-            raise ValueError(
-                f"{who}: dilatancy_angle {self.dilatancy_angle:g} deg must not exceed friction_angle "
-                f"{self.friction_angle:g} deg; the flow rule would create energy"
-            )
-        if self.model == "mohr-coulomb" and self.friction_angle == 0 and self.cohesion == 0:
-            raise ValueError(
-                f"{who}: friction_angle and cohesion must not both be 0, no strength at all; give one of them"
-            )
-        return self
-
-    def admissible_k0(self, vertical_stress: float) -> tuple[float, float]:
-        """Lowest and highest k0 that the strength bears under a vertical effective stress [Pa] (Mohr-Coulomb)."""
-        if self.model == "elastic" or vertical_stress <= 0:
-            return -math.inf, math.inf
-        return self._borne(self._cohesive / vertical_stress)
-
-    def lateral_pressure_coefficient(self, vertical_stress):
-        """K0 of the initial state under vertical effective stresses: horizontal over vertical effective stress [-].
-
-        `k0` where it is given. Left out, it is that of an elastic body which gravity loads without lateral strain,
-        nu / (1 - nu), raised to the active coefficient where Mohr-Coulomb soil does not bear it: sigma_h is at least
-        (sigma_v (1 - sin(phi)) - 2 c cos(phi)) / (1 + sin(phi)). The passive side is never reached: nu < 0.5.
-
-        Parameters
-        ----------
-        vertical_stress : float or (n,) float64
-            Compression positive [Pa].
-
-        Returns
-        -------
-        float or (n,) float64
-        """
-        if self.k0 is not None:
-            return self.k0
-        elastic = self.elastic_k0
-        if self.model == "elastic":
-            return elastic
-        if self.cohesion == 0:
-            return max(elastic, self._borne(0.0)[0])
-        if isinstance(vertical_stress, int | float):
-            return max(elastic, self.admissible_k0(vertical_stress)[0])
-        import numpy as np  # reading a scene needs none
-
-        under_load = np.where(vertical_stress > 0, vertical_stress, np.nan)
-        return np.fmax(elastic, self._borne(self._cohesive / under_load)[0])
-
-    @property
-    def elastic_k0(self) -> float:
-        """K0 of an elastic body that gravity loads without lateral strain, nu / (1 - nu) [-]."""
-        return self.poissons_ratio / (1 - self.poissons_ratio)
-
-    @property
-    def _cohesive(self):
-        return 2 * self.cohesion * math.cos(math.radians(self.friction_angle))
-
-    def _borne(self, cohesive):
-        """Active and passive coefficient, with 2 c cos(phi) over the vertical stress."""
-        sine = math.sin(math.radians(self.friction_angle))
-        return (1 - sine - cohesive) / (1 + sine), (1 + sine + cohesive) / (1 - sine)
-
-
-def _soil(given) -> str:
-    """The soil of a field that is checked, by its name where that is known by then."""
-    return f"soil '{given.data['name']}'" if "name" in given.data else "soil"
-
-
+#: A soil, of the class that its `model` names.
+SoilOfItsLaw = Annotated[SerializeAsAny[Soil], WrapValidator(soil_of_its_law)]
 #: How a lining stands in the ground: held, rigid and free to move, or a homogeneous elastic ring.
 Lining = Literal["fixed", "floating", "elastic"]
 
@@ -364,9 +184,9 @@ class Numerics(Part):
         waves that flow without dilatancy feeds.
     critical_step : str
         Where the critical time step comes from: "altitude" of the elements over the wave speed, or "spectral", the
-        largest eigenvalue of the points on their mesh, renewed now and then (`mpm.spectrum`).
+        largest eigenvalue of the points on their mesh, renewed now and then (`mpm.pace.spectrum`).
     local_time_stepping : bool
-        Groups of elements take steps of their own, powers of two times the smallest (`mpm.levels`).
+        Groups of elements take steps of their own, powers of two times the smallest (`mpm.pace.levels`).
     """
 
     courant: float = Field(default=0.8, gt=0, le=1)
@@ -427,7 +247,7 @@ class Scene(Part):
     gravity: Acceleration = Field(default=9.81, ge=0, le=100)
     box: Box
     water: Water | None = None
-    soils: tuple[Soil, ...] = Field(min_length=1, max_length=100)
+    soils: tuple[SoilOfItsLaw, ...] = Field(min_length=1, max_length=100)
     tunnels: tuple[Tunnel, ...] = Field(default=(), max_length=16)
     gate: Gate | None = None
     lining: Lining = "fixed"

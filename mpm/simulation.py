@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mpm.clock import ALMOST_ALL
 from mpm.errors import errors, largest_so_far
+from mpm.fields import CLAMPS, values
 from mpm.meshing import build_mesh
+from mpm.pace.clock import ALMOST_ALL
 from mpm.solver import RunFailed, Solver
 from mpm.state import restore_solver, solver_state
-from mpm.variables import CLAMPS, VLX, VLY, VSX, VSY, X, Y
 
 if TYPE_CHECKING:
     from mpm.mesh import Mesh
@@ -35,7 +35,7 @@ class Record:
     tunnel with theta [degrees from the crown, clockwise], arc [m], soil_pressure (effective), water_pressure,
     soil_shear (clockwise traction on the lining) and the standard deviation of the first two within the interval;
     of a lining that moves also its displacement at the end, and of an elastic one its forces
-    (`mpm.wall.MovingLinings.motion_at`).
+    (`mpm.walls.moving.MovingLinings.motion_at`).
     `balances` are those of :meth:`mpm.Solver.balances`, `errors` those of :func:`mpm.errors.errors`.
     """
 
@@ -231,14 +231,13 @@ class Simulation:
         possible = math.sqrt(2 * scene.gravity * scene.box.depth * (1 + densest / lightest))
         if not 0 < BEYOND_REASON * possible < solver.speed_at_limit:
             return
-        points = solver.points * (solver.element_of_point >= 0)[:, None]
-        speeds = np.maximum(np.hypot(points[:, VSX], points[:, VSY]), np.hypot(points[:, VLX], points[:, VLY]))
+        speeds = np.maximum(solver.speeds("solid"), solver.speeds("liquid")) * (solver.element_of_point >= 0)
         fastest = int(speeds.argmax())
         raise RunFailed(
             f"a material point moves at {speeds[fastest]:.0f} m/s, where weight and pressure give at most "
             f"{possible:.0f}: the computation is unstable; try numerics.courant = 0.4 or more points_per_element",
             solver.time,
-            solver.points[fastest, X : Y + 1],
+            values(solver.points[fastest], ("x", "y")),
         )
 
     def state(self) -> dict[str, Any]:
@@ -302,7 +301,7 @@ class Simulation:
             dt_limit=limit,
             steps=solver.step_count,
             lining=solver.lining_pressures(duration),
-            clamp_counts=dict(zip(CLAMPS, solver.clamps.sum(axis=0).tolist(), strict=True)),
+            clamp_counts={name: int(solver.clamps[name].sum()) for name in CLAMPS},
             balances=balances,
             errors=errors(self._largest),
             point_steps=solver.point_steps,

@@ -6,20 +6,31 @@ from concurrent.futures import wait
 
 import numpy as np
 
-from mpm import stages
-from mpm.clock import END, LIMITS, NOW, ORIGIN, SPAN, Clock, Pace, critical_time_step
-from mpm.contact import (
-    FIXED_X,
-    FIXED_Y,
-    MIRROR_X,
-    one_velocity_kernel,
-    remap_kernel,
-    solve_nodes,
+from mpm import relaxation
+from mpm.fields import (
+    CLAMP_RECORD,
+    CONTENT_RECORD,
+    LEDGER_RECORD,
+    MOMENTUM_RECORD,
+    NODE_RECORD,
+    REACTION_RECORD,
+    SUM_RECORD,
+    TIED_RECORD,
+    values,
 )
-from mpm.contact_nodes import contact_nodes
 from mpm.half_model import right_half
-from mpm.levels import element_levels, sorted_by_level, tie
-from mpm.long_step import (
+from mpm.laws.law import laws_of, soil_table
+from mpm.machine.threads import Threads, check_threads
+from mpm.measures import Measures
+from mpm.pace.clock import END, LIMITS, NOW, ORIGIN, SPAN, Clock, Pace, critical_time_step
+from mpm.pace.levels import element_levels, sorted_by_level, tie
+from mpm.pace.spectrum import Spectrum, spectral_time_step
+from mpm.pace.wave_speed import dry_wave_speed, fast_wave_speed
+from mpm.points import extremes_kernel, fill
+from mpm.scene import check_scene
+from mpm.step.cells import fill_cells
+from mpm.step.sort import cut_by_work, sort_by_element
+from mpm.step.substep import (
     ACTIVE,
     FOLLOW,
     LARGEST_COURANT,
@@ -34,42 +45,11 @@ from mpm.long_step import (
     Batch,
     long_step_kernel,
 )
-from mpm.measures import Measures
-from mpm.points import (
-    Cuts,
-    Layout,
-    cut_by_work,
-    fill,
-    locate_kernel,
-    porosity_ranges,
-    sort_by_element,
-)
-from mpm.scene import check_scene
-from mpm.spectrum import Spectrum, spectral_time_step
-from mpm.system import Ground, Medium, Net, System, Tally, Walls
-from mpm.tables import element_geometry, element_neighbours, outflow_nodes, soil_table
-from mpm.threads import Threads, check_threads
-from mpm.time_step import dry_wave_speed, fast_wave_speed
-from mpm.transfer import advance_kernel, fill_cells, update_kernel
-from mpm.variables import (
-    BUFFER_WIDTH,
-    CLAMPS,
-    E_PRESSURE,
-    E_VOLUME,
-    E_X,
-    E_Y,
-    ELEMENT_CONTENTS,
-    LEDGER,
-    MASS,
-    NODAL_MOMENTA,
-    NODE_WIDTH,
-    S_G,
-    S_LAMBDA,
-    P,
-    X,
-    Y,
-)
-from mpm.wall import MovingLinings
+from mpm.step.system import Cuts, Ground, Layout, Medium, Needs, Net, System, Tally, Walls
+from mpm.tables import element_geometry, element_neighbours, outflow_nodes
+from mpm.walls.contact import FIXED_X, FIXED_Y, MIRROR_X
+from mpm.walls.moving import MovingLinings
+from mpm.walls.nodes import contact_nodes
 
 PARTS = 4  # parts of the mesh that sum at the nodes on their own: fixed, so the bits do not depend on threads
 STEPS_BETWEEN_SORTS = 100
@@ -102,7 +82,7 @@ def threads_used(elements, asked=None):
 
 
 class Solver(Measures):
-    """Two-phase MPM on a body-fitted triangle mesh; linings are held or move (`mpm.wall`).
+    """Two-phase MPM on a body-fitted triangle mesh; linings are held or move (`mpm.walls.moving`).
 
     Parameters
     ----------
@@ -145,21 +125,22 @@ class Solver(Measures):
         self.order = np.zeros(len(self.points), np.int32)
         self.occupied = np.zeros(m, np.int32)
         self.touched = np.ones((PARTS, n_rows), np.uint8)  # which rows the parts may have added to
-        self.sums = np.zeros((PARTS, n_rows, BUFFER_WIDTH))
-        self.momenta = np.zeros((PARTS, n_rows, NODAL_MOMENTA))
-        self.nodes = np.zeros((n_rows, NODE_WIDTH))
-        self.tied_means = np.zeros((n_rows - n, 6))
+        self.sums = np.zeros((PARTS, n_rows), SUM_RECORD)
+        self.momenta = np.zeros((PARTS, n_rows), MOMENTUM_RECORD)
+        self.nodes = np.zeros(n_rows, NODE_RECORD)
+        self.tied_means = np.zeros(n_rows - n, TIED_RECORD)
         self.status = np.zeros(n, np.int8)
-        self.contents = np.zeros((m, ELEMENT_CONTENTS))
+        self._empty = np.zeros(1, SUM_RECORD), np.zeros(1, MOMENTUM_RECORD)
+        self.contents = np.zeros(m, CONTENT_RECORD)
         self.clock = Clock.of(self.levels, float(scene.numerics.stress_damping))
         self.threads = threads_used(m, threads)
         self.workers = Threads(self.threads, PARTS + 1)
-        self.clamps = np.zeros((PARTS, len(CLAMPS)), np.int64)
-        self.ledger = np.zeros((PARTS, len(LEDGER)))
+        self.clamps = np.zeros(PARTS, CLAMP_RECORD)
+        self.ledger = np.zeros(PARTS, LEDGER_RECORD)
         self.largest_courant = 0.0
         self.time, self.long_step_count, self.step_count, self.point_steps = 0.0, 0, 0, 0
         self.initial_volume = self._volumes()
-        self.initial_grain_mass = float(np.sum(self.points[:, MASS]))
+        self.initial_grain_mass = float(np.sum(self.points["grain_mass"]))
         self.initial = self.sums_over_points()
         self._spare = self.start.copy(), self.order.copy()
         # points that left their element, and that element
@@ -177,7 +158,7 @@ class Solver(Measures):
 
     def _cut_into_levels(self, mesh):
         """Sort the elements by level, finest first, and tie the levels; one level without local time stepping."""
-        altitude = element_geometry(mesh)[:, 7]
+        altitude = element_geometry(mesh)["altitude"]
         level = np.zeros(len(altitude), np.int8)
         # a lining that moves is solved together with all nodes on it, which then step together
         held = all(self.scene.lining_of(tunnel) == "fixed" for tunnel in self.scene.tunnels)
@@ -187,24 +168,23 @@ class Solver(Measures):
         mesh, level = sorted_by_level(mesh, level)
         self.levels = tie(mesh.elements, len(mesh.nodes), level)
         self.geometry = element_geometry(mesh)
-        self._altitude = self.geometry[:, 7] / 2.0**level  # in steps of level 0
+        self._altitude = self.geometry["altitude"] / 2.0**level  # in steps of level 0
         return mesh
 
     def _choose_kernels(self):
         """Kernels compiled for what the scene has, and nothing else."""
         scene = self.scene
         wet = scene.water is not None
-        plastic = any(soil.model == "mohr-coulomb" for soil in scene.soils)
-        tied = self.levels.count > 1
-        undrained = scene.is_undrained
-        self.kernels = (
-            solve_nodes if wet and not undrained else one_velocity_kernel(undrained),
-            advance_kernel(wet, undrained, tied),
-            remap_kernel(wet and not undrained),
-            update_kernel(wet, undrained, plastic, tied),
-            locate_kernel(wet, undrained, tied),
+        self.needs = Needs(
+            wet=wet,
+            two_phase=scene.is_two_phase,
+            tied=self.levels.count > 1,
+            moving=any(scene.lining_of(tunnel) != "fixed" for tunnel in scene.tunnels),
+            held_pressure=False,
+            laws=laws_of(scene),
         )
-        self._long_step = long_step_kernel(*self.kernels)
+        self._long_step = long_step_kernel(self.needs)
+        self._extremes_of_soils = extremes_kernel(self.needs.laws)
         self._water_density = scene.water.density if wet else 0.0
         self._water_modulus = scene.water.bulk_modulus if wet else 0.0
 
@@ -214,18 +194,18 @@ class Solver(Measures):
         self.n_contact = len(contact.node)
         self.contact_of_node = np.full(len(mesh.nodes), -1, np.int32)
         self.contact_of_node[contact.node] = np.arange(self.n_contact, dtype=np.int32)
-        self.normal, self._normal_open = contact.normal, contact.normal_open
-        self.active, self._active_open = contact.active, contact.active_open
-        self._closed = self.normal, self.active
-        self.friction, self.lining = contact.friction, contact.lining
+        self.contact, self._contact_open = contact.closed, contact.open
+        self._contact_closed = self.contact
+        self.lining = contact.lining
         on_mirror_line = np.isin(contact.node, self.mirror_line)
-        for normal in (self.normal, self._normal_open):
-            normal[on_mirror_line, 0] = 0.0
-        self.impulse = np.zeros((self.n_contact, 5))
-        self.moving, self.wall = None, None  # compiles the motion of the walls out
+        for records in (self.contact, self._contact_open):
+            records["normal_x"][on_mirror_line] = 0.0
+        self.impulse = np.zeros(self.n_contact, REACTION_RECORD)
+        self.moving, self.wall = None, np.zeros((self.n_contact, 2))
+        self.outside = np.zeros((0, 2))
         self.lining_displacement = self.lining_velocity = self.lining_impulse = np.zeros(0)
-        if any(scene.lining_of(tunnel) != "fixed" for tunnel in scene.tunnels):
-            self.moving = moving = MovingLinings(scene, mesh, self.contact_of_node, contact.moved_by)
+        if self.needs.moving:
+            self.moving = moving = MovingLinings(scene, self.needs, mesh, self.contact_of_node, contact.moved_by)
             self.wall = moving.wall
             self.lining_displacement, self.lining_velocity = moving.displacement, moving.velocity
             self.lining_impulse = moving.left
@@ -246,13 +226,17 @@ class Solver(Measures):
         self.initial_volume = self.initial_volume[new]
         self._sort()
 
+    def extremes_of_soils(self):
+        """Smallest and largest porosity, largest constrained modulus [Pa] of each soil's points: (n_soils, 3)."""
+        return self._extremes_of_soils(self.system().ground)
+
     def _update_wave_speed(self):
         speeds = []
-        ranges = porosity_ranges(self.points, self.element_of_point, self.soil_of_point, len(self.soils))
-        for k, (soil, (tightest, loosest)) in enumerate(zip(self.scene.soils, ranges.tolist(), strict=True)):
+        for soil, (tightest, loosest, modulus) in zip(
+            self.scene.soils, self.extremes_of_soils().tolist(), strict=True
+        ):
             if tightest > loosest:  # no point left
                 continue
-            modulus = self.soils[k, S_LAMBDA] + 2 * self.soils[k, S_G]
             if self.scene.water is None:
                 speeds.append(dry_wave_speed(modulus, min(loosest, soil.loose_porosity), soil.grain_density))
             else:
@@ -307,9 +291,9 @@ class Solver(Measures):
         """Sum the points at the nodes without advancing anything; sets the limits of the time step."""
         inside = self.element_of_point >= 0
         element, volume, points = self.element_of_point[inside], self._volumes()[inside], self.points[inside]
-        weights = {E_VOLUME: 1.0, E_PRESSURE: np.maximum(points[:, P], 0.0), E_X: points[:, X], E_Y: points[:, Y]}
-        for column, weight in weights.items():
-            self.contents[:, column] = np.bincount(element, volume * weight, len(self.contents))
+        pressure = np.maximum(points["pore_pressure"], 0.0)
+        for name, weight in {"volume": 1.0, "pressure": pressure, "x": points["x"], "y": points["y"]}.items():
+            self.contents[name] = np.bincount(element, volume * weight, len(self.contents))
         fill_cells(self.geometry, self.contents)
         self.sums[:] = 0.0
         self.clock.map_only()
@@ -322,7 +306,8 @@ class Solver(Measures):
         Bonded ground may ask for more shear than friction bears (`unborne_shear`), which `let_slip` takes away.
         """
         bonded = self.scene.initial_contact == "bonded"
-        return self._relax(np.full_like(self.friction, np.inf) if bonded else self.friction, progress)
+        friction = self.contact["friction"]
+        return self._relax(np.full_like(friction, np.inf) if bonded else friction, progress)
 
     def unborne_shear(self):
         """Share of the shear on the linings in the initial equilibrium that is beyond their friction [-]."""
@@ -336,17 +321,16 @@ class Solver(Measures):
 
     def let_slip(self, progress=None):
         """Settle the equilibrium at hand once more, with the lining's friction instead of a bond; as `relax`."""
-        return self._relax(self.friction, progress)
+        return self._relax(self.contact["friction"], progress)
 
     def _relax(self, friction, progress):
         numerics = self.scene.numerics
-        steps, residual, reaction = stages.relax(
+        steps, residual, self.impulse[:] = relaxation.relax(
             self, friction, numerics.relaxation_tolerance, numerics.max_relaxation_steps, progress
         )
         self._mapped = False
-        self.impulse[:] = 0.0
-        self.impulse[:, 0:3] = reaction
-        self.impulse[:, 3:5] = reaction[:, 0:2] ** 2
+        for name in ("soil", "water"):
+            self.impulse[f"{name}_squared"] = self.impulse[name] ** 2
         return steps, residual
 
     def open_gate(self):
@@ -354,15 +338,14 @@ class Solver(Measures):
 
         Without a gate in the scene the lining stays whole.
         """
-        self.normal = self._normal_open
-        self.active = self._active_open
+        self.contact = self._contact_open
         if self.scene.gate is not None and self.scene.gate.corners == "held":
             self.fixed[self.mesh.corner_nodes] |= FIXED_X | FIXED_Y
         self.gate_open = True
 
     def close_gate(self):
         """Put the plug back: what is in the channel stays there, and nothing follows through the face."""
-        self.normal, self.active = self._closed
+        self.contact = self._contact_closed
         self.fixed[self.mesh.corner_nodes] &= ~(FIXED_X | FIXED_Y)
         self.gate_open = False
 
@@ -411,27 +394,10 @@ class Solver(Measures):
             self._update_wave_speed()
         return [LIMITS[k] for k in batch.limits[:done].tolist()]
 
-    def _advance(self, batch):
-        """All passes of long steps."""
-        if self.moving is None:
-            self._run(PLAN, FOLLOW, batch)
-            return
-        self._run(PLAN, PLAN, batch)
-        dt = float(self.clock.dt_of_level[0])  # all levels are one
-        self.moving.advance(self.sums, dt, self.normal, self.active, self.friction)
-        self._run(SOLVE, FOLLOW)
-
-    def _run(self, first_pass, last_pass, batch=None, advance=True):
-        """Some passes (`mpm.long_step.PASSES`) of all substeps of long steps, by all threads; None: of one planned."""
-        if batch is None:
-            batch = Batch(
-                self.clock.periods[-1:].copy() if advance else np.ones(1, np.int64), np.zeros(0, np.int64), 0, 0
-            )
-        levels, counts = self.levels, self._counts
-        counts[:] = self.n_occupied, self.n_active, self.suspended, 0, 0
-        self._measures[:] = self.largest_courant, self.removed_mass
-        self._bad[:] = -1
-        system = System(
+    def system(self):
+        """The arrays and numbers that the kernels of a step read and write, as they are now."""
+        levels = self.levels
+        return System(
             Ground(
                 self.occupied, self.start, self.order, self.points, self.element_of_point, self.soil_of_point,
                 self.soils,
@@ -439,18 +405,36 @@ class Solver(Measures):
             Net(
                 levels.rows, self.geometry, self.neighbours, levels.of_element, self._layout,
                 self.contents, levels.nodes, levels.next_row, levels.of_row, self.nodes, self.tied_means, self.status,
-                self.touched, self.sums, self.momenta,
+                self.touched, self.sums, self.momenta, *self._empty,
             ),
-            Walls(
-                self.fixed, self.contact_of_node, self.normal, self.active, self.friction, self.wall, self.impulse
-            ),
+            Walls(self.fixed, self.contact_of_node, self.contact, self.wall, self.impulse, self.outside),
             self._cuts, self.clock, self._pace, Medium(self.scene.gravity, self._water_density, self._water_modulus),
             Tally(
-                counts, self._measures, self._limits, self._suspended, self._bad, self._n_left,
+                self._counts, self._measures, self._limits, self._suspended, self._bad, self._n_left,
                 self._first_left, self.clamps, self.ledger, *self._left, *self._spare, self._used,
             ),
         )  # fmt: skip
-        others = self.workers.together(self._long_step, first_pass, last_pass, advance, batch, system)
+
+    def _advance(self, batch):
+        """All passes of long steps."""
+        if self.moving is None:
+            self._run(PLAN, FOLLOW, batch)
+            return
+        self._run(PLAN, PLAN, batch)
+        self.moving.advance(self.system(), float(self.clock.dt_of_level[0]))  # all levels are one
+        self._run(SOLVE, FOLLOW)
+
+    def _run(self, first_pass, last_pass, batch=None, advance=True):
+        """Some passes (`mpm.step.substep.PASSES`) of all substeps of long steps, by all threads; None: of one planned."""
+        if batch is None:
+            batch = Batch(
+                self.clock.periods[-1:].copy() if advance else np.ones(1, np.int64), np.zeros(0, np.int64), 0, 0
+            )
+        counts = self._counts
+        counts[:] = self.n_occupied, self.n_active, self.suspended, 0, 0
+        self._measures[:] = self.largest_courant, self.removed_mass
+        self._bad[:] = -1
+        others = self.workers.together(self._long_step, first_pass, last_pass, advance, batch, self.system())
         self.n_occupied, self.n_active, self.suspended = (int(counts[k]) for k in (OCCUPIED, ACTIVE, SUSPENDED))
         self.largest_courant = float(self._measures[LARGEST_COURANT])
         self.removed_mass = float(self._measures[REMOVED_MASS])
@@ -460,7 +444,7 @@ class Solver(Measures):
             raise RunFailed(
                 "a material point became non-finite (velocity, stress or pore pressure)",
                 self.clock.time,
-                self.points[bad, X : Y + 1],
+                values(self.points[bad], ("x", "y")),
             )
         if advance:
             self.step_count += int(counts[SUBSTEPS])

@@ -1,46 +1,18 @@
-"""Tables that the kernels read: soils, elements, and what lies across the edges of elements."""
-
-import math
+"""Tables of the elements that the kernels read, and what lies across their edges."""
 
 import numpy as np
 
-from mpm.variables import MODEL_ELASTIC, MODEL_MOHR_COULOMB, SOIL_WIDTH
-
-
-def soil_table(scene):
-    """Parameters of the soils as the kernels read them: (n_soils, 13) float64."""
-    table = np.zeros((len(scene.soils), SOIL_WIDTH))
-    for row, soil in zip(table, scene.soils, strict=True):
-        shear = soil.youngs_modulus / (2 * (1 + soil.poissons_ratio))
-        lam = 2 * shear * soil.poissons_ratio / (1 - 2 * soil.poissons_ratio)
-        phi, psi = math.radians(soil.friction_angle), math.radians(soil.dilatancy_angle)
-        apex = soil.cohesion / math.tan(phi) if phi > 0 else math.inf
-        row[:] = (
-            MODEL_ELASTIC if soil.model == "elastic" else MODEL_MOHR_COULOMB,
-            lam,
-            shear,
-            lam + 2 * shear / 3,
-            soil.cohesion * math.cos(phi),
-            math.sin(phi),
-            math.sin(psi),
-            apex,
-            min(soil.tensile_strength, apex),
-            soil.loose_porosity,
-            scene.gravity / soil.hydraulic_conductivity if scene.is_two_phase else 0.0,
-            soil.grain_density,
-            soil.relaxation_time,
-        )
-    return table
+from mpm.fields import GEOMETRY_RECORD
 
 
 def element_geometry(mesh):
-    """Gradients, first corner, area and smallest altitude of every element: (n_elements, 8) float64."""
+    """Gradients, first corner, area and smallest altitude of every element: (n_elements,) records."""
     c = mesh.nodes[mesh.elements]
     e1, e2 = c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]
     det = e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]
     longest = np.max([np.linalg.norm(v, axis=1) for v in (e1, e2, e2 - e1)], axis=0)
     columns = [e2[:, 1] / det, -e2[:, 0] / det, -e1[:, 1] / det, e1[:, 0] / det, c[:, 0, 0], c[:, 0, 1], det / 2]
-    return np.ascontiguousarray(np.stack([*columns, det / longest], axis=1))
+    return np.stack([*columns, det / longest], axis=1).view(GEOMETRY_RECORD)[:, 0]
 
 
 def outflow_nodes(scene, mesh):

@@ -11,7 +11,7 @@ from coupling.datasets import BALANCES, ERRORS
 from coupling.files.provenance import root_attributes
 from coupling.responses.respond import respond
 from mpm.simulation import Record
-from mpm.variables import CLAMPS, POINT_VARIABLES
+from mpm.variables import CLAMPS, POINT
 
 THETA = np.sort(np.concatenate([np.arange(0.0, 360.0, 4.0), [88.3, 90.0, 91.7]]))
 
@@ -50,7 +50,7 @@ def lining(time, theta=THETA):
 def points(time, count=400):
     """A ring of points around the tunnel of the quick scene, one of them taken out."""
     angle, radius = np.linspace(0, 2 * np.pi, count, endpoint=False), 3.4 + 4.0 * np.linspace(0, 1, count)
-    data = {name: np.full(count, 1.0) for name, _, _ in POINT_VARIABLES}
+    data = {name: np.full(count, 1.0) for name, _, _ in POINT}
     data["x"], data["y"] = radius * np.sin(angle), -23.3 + radius * np.cos(angle)
     data["stress_yy"], data["pore_pressure"] = 9e3 * data["y"], -9.81e3 * data["y"]
     data["deviatoric_strain"] = 0.1 * time * np.exp(3.4 - radius)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from mpm.variables import CLAMPS, POINT_VARIABLES
+from mpm.fields import CLAMPS, POINT
 
 AXES = {"time": "T", "x": "X", "y": "Y"}
 INFLOW = "inflow_mass"  # a coordinate along time, beside the time itself
@@ -88,7 +88,7 @@ HISTORY = {
 INTEGERS = {"steps", "point_steps", *(f"clamp_{name}" for name in CLAMPS)}
 #: Variables on (time, point) of `/points`, from the solver's own table.
 POINTS = {
-    **{name: (unit, meaning) for name, unit, meaning in POINT_VARIABLES if not name.endswith("_initial")},
+    **{name: (unit, meaning) for name, unit, meaning in POINT if not name.endswith("_initial")},
     "displacement_x": ("m", "horizontal displacement since the start"),
     "displacement_y": ("m", "vertical displacement since the start, upward positive"),
     "volume": ("m^2", "area that the point stands for, per metre of tunnel"),

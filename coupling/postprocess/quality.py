@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mpm.errors import COMPARED
-from mpm.variables import CLAMPS
+from mpm.fields import CLAMPS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -10,7 +10,7 @@ from coupling.datasets import opened, read_attributes, read_history, read_pressu
 from coupling.datasets.geometry import on_tunnel, tunnels_beside
 from coupling.postprocess.extremes import extremes
 from coupling.postprocess.quality import lining_equilibrium, quality, verdicts
-from mpm.variables import CLAMPS
+from mpm.fields import CLAMPS
 from structure.response import FORCES
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ from coupling.datasets.tree import match_times, model_names
 from coupling.postprocess.extremes import RING_EXTREMES, ring_extremes, shown_extreme
 from coupling.postprocess.quality import ERRORS, STATES
 from coupling.postprocess.summary import PLACES
-from mpm.variables import CLAMPS
+from mpm.fields import CLAMPS
 
-#: What it means that points meet a limit, by its name in :data:`mpm.variables.CLAMPS`.
+#: What it means that points meet a limit, by its name in :data:`mpm.fields.CLAMPS`.
 MEANINGS = {
     "tension": "grains that are not pressed together bear no tension",
     "suspended": "looser than the loose porosity they do not touch and bear no stress",

@@ -111,7 +111,7 @@ def _work(solver, dt, interval, time):
 
 def _work_within(solver, steps):
     """The same within one interval, `steps` times the critical step of the smallest elements long."""
-    from mpm.clock import choose_periods
+    from mpm.pace.clock import choose_periods
 
     points = np.diff(solver.start[solver.levels.element_cuts]).astype(np.int64)
     periods = np.ones(len(points), np.int64)
@@ -153,8 +153,8 @@ def rough_plan(
     coupling.refused.Refused
         Too little memory.
     """
+    from mpm.machine.threads import check_threads
     from mpm.solver import threads_used
-    from mpm.threads import check_threads
 
     scene = _checked(scene, warn)
     check_threads(threads)
@@ -190,7 +190,7 @@ def _rough_steps(dt, interval, time):
 
 
 def _wave_speed(soil, water):
-    from mpm.time_step import dry_wave_speed, fast_wave_speed
+    from mpm.pace.wave_speed import dry_wave_speed, fast_wave_speed
 
     nu = soil.poissons_ratio
     modulus = soil.youngs_modulus * (1 - nu) / ((1 + nu) * (1 - 2 * nu))

@@ -28,7 +28,7 @@ from coupling.runs.recorded_simulation import RecordedSimulation
 from coupling.runs.resume import find_remains
 from coupling.scenes.plausibility import warn_in_python, warnings_of
 from coupling.scenes.scene import as_scene
-from mpm.threads import check_threads
+from mpm.machine.threads import check_threads
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from mpm.scene import quantity_in
+from mpm.quantities import quantity_in
 
 #: Key of [ring] to the unit of `structure.Ring`. A ring is one metre of tunnel: what is per metre may leave that out.
 RING = {
@@ -62,7 +62,7 @@ def ring_number(location: tuple[str, ...], value: Any) -> Any:
     Raises
     ------
     ValueError
-        As :func:`mpm.scene.quantity_in`.
+        As :func:`mpm.quantities.quantity_in`.
     """
     unit = ring_unit(location)
     if unit is None:

@@ -32,8 +32,8 @@ from coupling.scenes.mistakes import mistake_line
 from coupling.scenes.plausibility import hints
 from coupling.scenes.ring_units import ring_in_si, ring_number, ring_unit
 from coupling.scenes.rings import derived_ring
+from mpm.quantities import quantity_in
 from mpm.scene import Scene as MpmScene
-from mpm.scene import quantity_in
 from structure.inputs import Input, mistakes, models_in, shortened, table_html
 from structure.ring import Ring
 
@@ -269,7 +269,7 @@ def number_in_unit(name: str, value: Any) -> Any:
     Raises
     ------
     ValueError
-        As :func:`mpm.scene.quantity_in`.
+        As :func:`mpm.quantities.quantity_in`.
     """
     parts = _without_numbers(name)
     if parts[0] == "ring":

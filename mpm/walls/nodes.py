@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from mpm.fields import CONTACT_RECORD
 from mpm.half_model import ring_factors, whole_ring
 from mpm.points import initial_stress
 
@@ -15,9 +16,8 @@ def contact_nodes(scene, mesh):
     Returns
     -------
     SimpleNamespace
-        node: (n_contact,) int; normal, normal_open: (n_contact, 2) float64, into the material, with the gate
-        shut and open; active, active_open: (n_contact,) int8, whether the wall is there; friction: (n_contact,);
-        lining: a SimpleNamespace for each tunnel with theta [deg], arc [m], rows of the contact arrays, factors of
+        node: (n_contact,) int; closed, open: (n_contact,) records of `mpm.fields.CONTACT`, with the gate shut and
+        open; lining: a SimpleNamespace for each tunnel with theta [deg], arc [m], rows of the contact arrays, factors of
         their impulses, and whether they bear with the gate open; moved_by: rows that move with each tunnel's lining.
     """
     node, closed, opened, active_closed, active_open, friction = [], [], [], [], [], []
@@ -70,13 +70,14 @@ def contact_nodes(scene, mesh):
     rows = [part.rows for part in lining]
     if scene.gate is not None:
         rows[scene.gate.tunnel] = np.r_[rows[scene.gate.tunnel], len(node) - rest : len(node)]
+    records = {}
+    for name, normals, active in (("closed", closed, active_closed), ("open", opened, active_open)):
+        records[name] = np.zeros(len(node), CONTACT_RECORD)
+        records[name]["normal_x"], records[name]["normal_y"] = np.array(normals, float).reshape(-1, 2).T
+        records[name]["active"], records[name]["friction"] = active, friction
     return SimpleNamespace(
         node=np.array(node, int),
-        normal=np.array(closed, float).reshape(-1, 2),
-        normal_open=np.array(opened, float).reshape(-1, 2),
-        active=np.array(active_closed, np.int8),
-        active_open=np.array(active_open, np.int8),
-        friction=np.array(friction, float),
+        **records,
         lining=lining,
         moved_by=rows,
     )

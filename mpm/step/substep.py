@@ -1,6 +1,6 @@
 """Long steps in compiled code: all their substeps, pass by pass, by threads that meet between the passes.
 
-Every thread calls the same kernel and shares the passes with the others (`mpm.meeting`). The parts are those of the
+Every thread calls the same kernel and shares the passes with the others (`mpm.machine.team`). The parts are those of the
 mesh, whatever the number of threads, and so are the bits.
 """
 
@@ -10,10 +10,14 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from mpm.clock import ALMOST_ALL, END, NOW, SMALLEST, SPAN, plan_step
-from mpm.jit import kernel, kernel_part
-from mpm.meeting import Team, shared
-from mpm.points import cut_by_work, follow_points
+from mpm.machine.compile import kernel, kernel_part
+from mpm.machine.team import Team, shared
+from mpm.pace.clock import ALMOST_ALL, END, NOW, SMALLEST, SPAN, plan_step
+from mpm.step.find import follow_points, locate_kernel
+from mpm.step.nodes import remap_kernel, solve_kernel
+from mpm.step.nodes_to_points import advance_kernel
+from mpm.step.points_to_nodes import update_kernel
+from mpm.step.sort import cut_by_work
 
 #: Of the process, in microseconds (POSIX).
 processor_time = types.ExternalFunction("clock", types.int64())
@@ -22,7 +26,7 @@ PASSES = (
     "plan_step", "solve_nodes", "advance_points", "remap_nodes", "update_points", "locate", "follow_points",
 )  # fmt: skip
 (PLAN, SOLVE, ADVANCE, REMAP, UPDATE, LOCATE, FOLLOW) = range(len(PASSES))
-#: What the passes count, beside the arrays: places in `Tally.counts` of `mpm.system`.
+#: What the passes count, beside the arrays: places in `Tally.counts` of `mpm.step.system`.
 (OCCUPIED, ACTIVE, SUSPENDED, SUBSTEPS, POINT_STEPS) = range(5)
 #: And in `Tally.measures`: the largest time step over the critical one it led to, mass of the points taken out.
 LARGEST_COURANT, REMOVED_MASS = range(2)
@@ -35,7 +39,7 @@ class Batch(NamedTuple):
     """
 
     substeps: np.ndarray  # (most + 1,) int64; 0 ends the batch
-    limits: np.ndarray  # (most,) int64, places in `mpm.clock.LIMITS`
+    limits: np.ndarray  # (most,) int64, places in `mpm.pace.clock.LIMITS`
     most_substeps: int  # no further long step begins after so many of the finest level
     most_point_steps: int
 
@@ -109,8 +113,10 @@ def plan(number, batch, system):
 
 
 @cache
-def long_step_kernel(solve_nodes, advance_points, remap_nodes, update_points, locate):
-    """Kernel `long_step` of the kernels that a scene needs."""
+def long_step_kernel(needs):
+    """Kernel `long_step` for what a scene needs (`mpm.step.system.Needs`)."""
+    solve_nodes, advance_points, remap_nodes = solve_kernel(needs), advance_kernel(needs), remap_kernel(needs)
+    update_points, locate = update_kernel(needs), locate_kernel(needs)
 
     @kernel_part
     def update(team, part, finished, advance, system):
@@ -144,7 +150,7 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, update_points, lo
         Momentum of the nodes, velocities and places of the points, velocities of the nodes from theirs (MUSL), strains,
         stresses and pressures, masses and forces at the nodes.
         """
-        parts, cuts, wall = system.net.sums.shape[0], system.cuts, system.walls.velocity
+        parts, cuts = system.net.sums.shape[0], system.cuts
         begun, finished = system.clock.begun, system.clock.finished
         lap(team, system, -1)
         if first_pass <= SOLVE:
@@ -156,7 +162,7 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, update_points, lo
                     lap(team, system, FOLLOW)
                     continue
                 for level in range(begun[k] + 1):
-                    solve_nodes(cuts.solved[level, part], cuts.solved[level, part + 1], part, begun[k], wall, system)
+                    solve_nodes(cuts.solved[level, part], cuts.solved[level, part + 1], part, begun[k], system)
                 lap(team, system, SOLVE)
             lap(team, system, SOLVE)
         if first_pass <= ADVANCE <= last_pass:
@@ -167,7 +173,7 @@ def long_step_kernel(solve_nodes, advance_points, remap_nodes, update_points, lo
         if first_pass <= REMAP <= last_pass:
             for part in shared(team, parts):
                 for level in range(finished[k] + 1):
-                    remap_nodes(cuts.nodes[level, part], cuts.nodes[level, part + 1], finished[k], wall, system)
+                    remap_nodes(cuts.nodes[level, part], cuts.nodes[level, part + 1], finished[k], system)
             lap(team, system, REMAP)
         if UPDATE <= last_pass:
             for part in shared(team, parts):

@@ -28,7 +28,7 @@ def source_key(options):
     """Hash of all kernel sources, the compiler's options and the versions [str]."""
     settings = [f"{name}={getattr(numba.config, name, None)}" for name in SETTINGS]
     digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__} {options} {settings}".encode())
-    for source in sorted(Path(__file__).parent.rglob("*.py")):
+    for source in sorted(Path(__file__).parent.parent.rglob("*.py")):
         digest.update(source.read_bytes())
     return digest.hexdigest()[:16]
 

@@ -9,7 +9,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from mpm.kernel_cache import KernelCache, kernel_folder, variant_name
+from mpm.machine.kernel_cache import KernelCache, kernel_folder, variant_name
 
 # contract: fused multiply-add; nsz, arcp: harmless reordering. No "nnan" or "ninf": the
 # non-finite check of the solver relies on NaN keeping its meaning.

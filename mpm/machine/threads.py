@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor, wait
 
 import numpy as np
 
-from mpm.meeting import meeting_width, stage_at_hand
+from mpm.machine.team import meeting_width, stage_at_hand
 
 
 def check_threads(threads):
@@ -40,7 +40,7 @@ class Threads:
     def together(self, kernel, *arguments):
         """Run a kernel of many stages by all threads: kernel(thread, meeting, first stage, *arguments).
 
-        One that is late finds all done by the others (`mpm.meeting`), so nobody waits for its end.
+        One that is late finds all done by the others (`mpm.machine.team`), so nobody waits for its end.
 
         Returns
         -------

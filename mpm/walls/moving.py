@@ -2,7 +2,7 @@
 
 A light or stiff ring under heavy soil is unstable when each is advanced with the other's old state, so both are solved
 together: at every contact node the reactions of soil and water follow from the velocity of the wall there (the node
-equations of `mpm.contact`, seen from the wall), and the ring's velocity u is the root of
+equations of `mpm.walls.contact`, seen from the wall), and the ring's velocity u is the root of
     F(u) = A (u - u0) - dt (weight - K x) + sum over nodes of G^T dt R(G u),   A = M + dt^2/4 K,
 with G the velocity of a node per coordinate of the ring. The reactions are piecewise linear in u, so Newton's method
 ends after as many iterations as contacts change their state in a step, mostly one. What it leaves is taken into the
@@ -14,52 +14,45 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from mpm.contact import wall_normal
-from mpm.jit import kernel
-from mpm.lining import ElasticRing, RigidRing
-from mpm.variables import B_D, B_FLX, B_FLY, B_FX, B_FY, B_ML, B_MN, B_MS, B_PLX, B_PLY, B_PSX, B_PSY
+from mpm.fields import record, values
+from mpm.machine.compile import kernel, kernel_part
+from mpm.step.nodes import free_kernel, moved, sum_kernel, velocities_of
+from mpm.walls.contact import Masses, Pair, response_kernel
+from mpm.walls.rings import ElasticRing, RigidRing
 
 MAX_ITERATIONS = 100
 SMALLEST_SHARE = 1e-3  # of Newton's step
 TOLERANCE = 1e-11  # of the largest term of an equation: round-off of its sum
 
-# What a contact node brings to the solution: masses, drag times dt, momenta free of reactions; and of its reactions.
-(K_MS, K_ML, K_MN, K_D, K_BSX, K_BSY, K_BLX, K_BLY) = range(8)
-NODE_STATE = 8
+#: What a contact node brings to the solution: masses, drag times dt, momenta free of reactions.
+STATE_RECORD = record(
+    ("solid", "liquid", "pore", "drag", "momentum_solid_x", "momentum_solid_y", "momentum_liquid_x",
+     "momentum_liquid_y")
+)  # fmt: skip
 
 
 @cache
-def gather_kernel(wet):
-    """Kernel `gather` for soil with pore water or without."""
+def gather_kernel(needs):
+    """Kernel `gather` for what a scene needs."""
+    two_phase, sum_of_node, without_reactions = needs.two_phase, sum_kernel(needs), free_kernel(needs)
 
     @kernel
-    def gather(sums, dt, gravity, rows, node_of_contact, state):
+    def gather(system, dt, rows, node_of_contact, state):
         """Masses and momenta of the contact nodes `rows` at the end of a step without reactions.
 
-        sums : (n_parts, n_nodes, 13) float64, of `update_points`.
         rows, node_of_contact : (k,), (n_contact,) int
-        state : (k, 8) float64, written.
+        state : (k,) records, written.
         """
+        gravity = system.medium.gravity
         for k in range(rows.size):
-            i = node_of_contact[rows[k]]
-            b = np.zeros(sums.shape[2])
-            for part in range(sums.shape[0]):
-                b += sums[part, i]
             row = state[k]
-            row[:] = 0.0
-            ms, ml, mn = b[B_MS], b[B_ML], b[B_MN]
-            if wet:
-                if ms <= 0.0 or ml <= 0.0:
-                    continue
-                row[K_ML], row[K_MN], row[K_D] = ml, mn, dt * b[B_D]
-                row[K_BLX] = b[B_PLX] + dt * b[B_FLX]
-                row[K_BLY] = b[B_PLY] + dt * (b[B_FLY] - ml * gravity)
-                row[K_BSX] = b[B_PSX] + mn * b[B_PLX] / ml + dt * b[B_FX]
-                row[K_BSY] = b[B_PSY] + mn * b[B_PLY] / ml + dt * (b[B_FY] - (ms + mn) * gravity)
-            else:
-                row[K_BSX] = b[B_PSX] + dt * b[B_FX]
-                row[K_BSY] = b[B_PSY] + dt * (b[B_FY] - ms * gravity)
-            row[K_MS] = ms
+            m, p, force = sum_of_node(node_of_contact[rows[k]], dt, system.net, system.walls)
+            row.solid, row.liquid, row.pore, row.drag = m
+            if m.solid <= 0.0 or (two_phase and m.liquid <= 0.0):
+                row.solid = 0.0
+                continue
+            b = without_reactions(m, p, velocities_of(m, p, two_phase), force, dt, gravity)
+            row.momentum_solid_x, row.momentum_solid_y, row.momentum_liquid_x, row.momentum_liquid_y = b
 
     return gather
 
@@ -67,49 +60,17 @@ def gather_kernel(wet):
 @cache
 def reaction_kernel(wet):
     """Kernel `react` for soil with pore water or without."""
+    response = response_kernel(wet)
 
-    @kernel
-    def react(row, nx, ny, friction, ux, uy, dt):
-        """Impulse that a moving wall gives to a node in dt, and how it grows with the wall's velocity.
+    @kernel_part
+    def react(row, contact, x, y):
+        """Impulse that a wall that moves with (x, y) [m/s] gives to a node, and its derivatives: see `response`.
 
-        row : (8,) float64, of `gather`;  ux, uy : velocity of the wall [m/s].
-
-        Returns
-        -------
-        push, shear : float
-            Normal (soil and water) and tangential impulse on the material [N s/m], the latter along (ny, -nx).
-        push_n, shear_n, shear_t : float
-            Derivatives by the normal and the tangential velocity of the wall [kg/m].
+        row : record of `gather`;  contact : record of the wall there.
         """
-        ms, ml, mn, d = row[K_MS], row[K_ML], row[K_MN], row[K_D]
-        bsx, bsy = row[K_BSX] - (ms + mn) * ux, row[K_BSY] - (ms + mn) * uy
-        bsn, bst = nx * bsx + ny * bsy, ny * bsx - nx * bsy
-        push = push_n = grip = grip_n = shear = shear_n = shear_t = 0.0
-        mass_t, free_t = ms, bst  # what friction must hold
-        if wet:
-            blx, bly = row[K_BLX] - ml * ux, row[K_BLY] - ml * uy
-            bln, blt = nx * blx + ny * bly, ny * blx - nx * bly
-            _, vl, r_s, r_l = wall_normal(bsn, bln, ms, ml, mn, d, dt)
-            grip, push = dt * r_s, dt * (r_s + r_l)
-            # the wall's mass matrix of what it holds: grains and water, water alone, grains alone
-            if r_s > 0.0 and vl == 0.0:
-                grip_n, push_n = ms + mn - ml, ms + mn
-            elif r_s > 0.0:
-                grip_n = push_n = ms + mn - mn * ml / (ml + d)
-            elif r_l > 0.0:
-                push_n = ml + d * (ms + mn - ml) / (ms + d)
-            mass_t = ms + mn - mn * ml / (ml + d)
-            free_t = bst - mn * blt / (ml + d)
-        elif bsn < 0.0:
-            grip = push = -bsn
-            grip_n = push_n = ms
-        if grip > 0.0:
-            shear, shear_t = -free_t, mass_t
-            limit = friction * grip
-            if abs(shear) > limit:
-                sign = 1.0 if shear > 0.0 else -1.0
-                shear, shear_n, shear_t = sign * limit, sign * friction * grip_n, 0.0
-        return push, shear, push_n, shear_n, shear_t
+        m = Masses(row.solid, row.liquid, row.pore, row.drag)
+        b = Pair(row.momentum_solid_x, row.momentum_solid_y, row.momentum_liquid_x, row.momentum_liquid_y)
+        return response(moved(b, m, x, y), m, contact)
 
     return react
 
@@ -148,17 +109,15 @@ def velocity_kernel(wet):
     react = reaction_kernel(wet)
 
     @kernel
-    def find_velocity(
-        state, rows, motion, normal, active, friction, effective_mass, due, dt, velocity, left, wall
-    ):  # fmt: skip
+    def find_velocity(state, rows, motion, contact, effective_mass, due, velocity, left, wall):
         """Velocity of the ring and of the wall at its nodes, in place, by Newton's method.
 
         Parameters
         ----------
-        state : (k, 8) float64
+        state : (k,) records
             Of `gather`.
         rows : (k,) int
-            Rows of the contact arrays `normal`, `active`, `friction` and `wall`.
+            Rows of `contact` and `wall`.
         motion : (k, 2, m) float64
             Velocity of the nodes per coordinate.
         effective_mass, due : (m, m), (m,) float64
@@ -194,10 +153,10 @@ def velocity_kernel(wet):
                     ux += g[0, j] * velocity[j]
                     uy += g[1, j] * velocity[j]
                 wall[c, 0], wall[c, 1] = ux, uy
-                if not active[c] or state[k, K_MS] <= 0.0:
+                if contact[c].active <= 0.0 or state[k].solid <= 0.0:
                     continue
-                nx, ny = normal[c, 0], normal[c, 1]
-                push, shear, push_n, shear_n, shear_t = react(state[k], nx, ny, friction[c], ux, uy, dt)
+                nx, ny = contact[c].normal_x, contact[c].normal_y
+                push, shear, push_n, shear_n, shear_t = react(state[k], contact[c], ux, uy)
                 if push == 0.0:
                     continue
                 for j in range(m):
@@ -250,6 +209,7 @@ class MovingLinings:
     Parameters
     ----------
     scene : mpm.scene.Scene
+    needs : mpm.step.system.Needs
     mesh : mpm.mesh.Mesh
     contact_of_node : (n_nodes,) int32
         Row of the contact arrays or -1.
@@ -264,13 +224,12 @@ class MovingLinings:
         Velocity of the lining at its contact nodes [m/s], of the step at hand.
     """
 
-    def __init__(self, scene, mesh, contact_of_node, rows_of_tunnel):
+    def __init__(self, scene, needs, mesh, contact_of_node, rows_of_tunnel):
         on_lining = np.flatnonzero(contact_of_node >= 0)
         self.node_of_contact = np.zeros(len(on_lining), np.int32)
         self.node_of_contact[contact_of_node[on_lining]] = on_lining
-        wet = scene.water is not None
-        self._gather, self._find, self._find_dry = gather_kernel(wet), velocity_kernel(wet), velocity_kernel(False)
-        self.gravity = scene.gravity
+        self._gather, self._find = gather_kernel(needs), velocity_kernel(needs.wet)
+        self._find_dry = velocity_kernel(False)
         self.wall = np.zeros((len(on_lining), 2))
         self.parts = []
         rings = [(t, ring) for t, ring in enumerate(lining_ring(scene, tunnel) for tunnel in scene.tunnels) if ring]
@@ -286,26 +245,29 @@ class MovingLinings:
                     ring=ring,
                     rows=rows,
                     motion=ring.motion(theta, radius),
-                    state=np.zeros((len(rows), NODE_STATE)),
+                    state=np.zeros(len(rows), STATE_RECORD),
                     due=np.zeros(last - first),
                     **{name: getattr(self, name)[first:last] for name in ("displacement", "velocity", "left")},
                 )
             )
 
-    def advance(self, sums, dt, normal, active, friction):
-        """Move the rings by dt [s] together with the material at their nodes; sets `wall`."""
+    def advance(self, system, dt):
+        """Move the rings by dt [s] together with the material at their nodes; sets `wall`.
+
+        system : mpm.step.system.System, whose nodal sums are those of the points as they are.
+        """
         for part in self.parts:
             ring = part.ring
-            self._gather(sums, dt, self.gravity, part.rows, self.node_of_contact, part.state)
+            self._gather(system, dt, part.rows, self.node_of_contact, part.state)
             ring_impulse(ring.stiffness, ring.weight, part.displacement, dt, part.due)
             self._find(
-                part.state, part.rows, part.motion, normal, active, friction, ring.effective_mass(dt), part.due, dt,
+                part.state, part.rows, part.motion, system.walls.contact, ring.effective_mass(dt), part.due,
                 part.velocity, part.left, self.wall,
             )  # fmt: skip
             part.displacement += dt * part.velocity
 
-    def settle(self, force, held_liquid, mass, velocity, normal, active, friction):
-        """One pseudo time step of 1 s of the drained relaxation (`mpm.stages`): moves the rings, sets `wall`.
+    def settle(self, force, held_liquid, mass, velocity, contact):
+        """One pseudo time step of 1 s of the drained relaxation (`mpm.relaxation`): moves the rings, sets `wall`.
 
         The inertia of a ring is fictitious as the soil's, as large as that of its contact nodes; its stiffness acts at
         the end of the step (Euler backward), so stiff motions settle at once.
@@ -325,17 +287,19 @@ class MovingLinings:
         energy = unbalanced = 0.0
         for part in self.parts:
             ring, rows = part.ring, part.rows
-            nodes, n = self.node_of_contact[rows], normal[rows]
-            water = np.where(active[rows] > 0, np.maximum(-np.sum(n * held_liquid[nodes], axis=1), 0.0), 0.0)
-            part.state[:, K_MS] = mass[nodes]
-            part.state[:, K_BSX : K_BSY + 1] = mass[nodes, None] * velocity[nodes] + force[nodes] + water[:, None] * n
+            nodes, n = self.node_of_contact[rows], values(contact[rows], ("normal_x", "normal_y"))
+            pressed = np.maximum(-np.sum(n * held_liquid[nodes], axis=1), 0.0)
+            water = np.where(contact["active"][rows] > 0, pressed, 0.0)
+            part.state["solid"] = mass[nodes]
+            free = mass[nodes, None] * velocity[nodes] + force[nodes] + water[:, None] * n
+            part.state["momentum_solid_x"], part.state["momentum_solid_y"] = free.T
             ring_mass = ring.mass * (mass[nodes].sum() / ring.mass.diagonal().max())
             before = part.velocity.copy()
             ring_impulse(ring.stiffness, ring.weight, part.displacement + before, 1.0, part.due)
             part.due -= np.einsum("kdm,kd,k->m", part.motion, n, water)
             self._find_dry(
-                part.state, rows, part.motion, normal, active, friction, ring_mass + ring.stiffness, part.due, 1.0,
-                part.velocity, part.left, self.wall,
+                part.state, rows, part.motion, contact, ring_mass + ring.stiffness, part.due, part.velocity, part.left,
+                self.wall,
             )  # fmt: skip
             part.displacement += part.velocity
             momentum = np.einsum("ij,j->i", ring_mass, part.velocity)
@@ -355,7 +319,7 @@ class MovingLinings:
         -------
         dict of str to (n,) float64
             displacement_radial, displacement_tangential [m], outward and clockwise; for an elastic ring axial_force,
-            shear_force [N/m], bending_moment [N m/m] of :meth:`mpm.lining.ElasticRing.internal_forces`. Zero and
+            shear_force [N/m], bending_moment [N m/m] of :meth:`mpm.walls.rings.ElasticRing.internal_forces`. Zero and
             empty for a fixed lining.
         """
         part = next((part for part in self.parts if part.tunnel == tunnel), None)

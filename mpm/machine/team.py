@@ -14,7 +14,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from mpm.jit import kernel_part
+from mpm.machine.compile import kernel_part
 
 SPINS = 300_000  # some eighty microseconds, about as long as one thread repairs the list of points
 PAUSE = 50  # microseconds

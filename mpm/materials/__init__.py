@@ -1,1 +1,0 @@
-"""Constitutive laws: pure functions of a stress and a strain increment."""
