@@ -228,7 +228,7 @@ class Solver(Measures):
 
     def extremes_of_soils(self):
         """Smallest and largest porosity, largest constrained modulus [Pa] of each soil's points: (n_soils, 3)."""
-        return self._extremes_of_soils(self.system().ground)
+        return self._extremes_of_soils(self.ground)
 
     def _update_wave_speed(self):
         speeds = []
@@ -394,21 +394,30 @@ class Solver(Measures):
             self._update_wave_speed()
         return [LIMITS[k] for k in batch.limits[:done].tolist()]
 
+    @property
+    def ground(self):
+        """Points by element, and the soils."""
+        return Ground(
+            self.occupied, self.start, self.order, self.points, self.element_of_point, self.soil_of_point, self.soils
+        )
+
+    @property
+    def medium(self):
+        """Gravity and water."""
+        return Medium(self.scene.gravity, self._water_density, self._water_modulus)
+
     def system(self):
         """The arrays and numbers that the kernels of a step read and write, as they are now."""
         levels = self.levels
         return System(
-            Ground(
-                self.occupied, self.start, self.order, self.points, self.element_of_point, self.soil_of_point,
-                self.soils,
-            ),
+            self.ground,
             Net(
                 levels.rows, self.geometry, self.neighbours, levels.of_element, self._layout,
                 self.contents, levels.nodes, levels.next_row, levels.of_row, self.nodes, self.tied_means, self.status,
                 self.touched, self.sums, self.momenta, *self._empty,
             ),
             Walls(self.fixed, self.contact_of_node, self.contact, self.wall, self.impulse, self.outside),
-            self._cuts, self.clock, self._pace, Medium(self.scene.gravity, self._water_density, self._water_modulus),
+            self._cuts, self.clock, self._pace, self.medium,
             Tally(
                 self._counts, self._measures, self._limits, self._suspended, self._bad, self._n_left,
                 self._first_left, self.clamps, self.ledger, *self._left, *self._spare, self._used,

@@ -1,6 +1,7 @@
 """The kernel decorator: one place for numba's options."""
 
 import os
+from functools import partial
 
 import numba
 import numpy as np
@@ -33,9 +34,19 @@ def kernel(function, **options):
     return compiled
 
 
-def kernel_part(function):
-    """A kernel that only other kernels call. It has no machine code of its own: called from Python it crashes."""
-    return _compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+def kernel_part(function, allocates=False):
+    """A kernel that only other kernels call. It has no machine code of its own: called from Python it crashes.
+
+    Arrays are the caller's and live as long as it runs. So they are not counted: of every array taken out of a group
+    numba would count the references, with atomic instructions that two threads wait for.
+
+    allocates : bool
+        Whether it makes arrays of its own, which have to be counted.
+    """
+    return _compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=allocates)
+
+
+allocating_part = partial(kernel_part, allocates=True)
 
 
 def integer_kernel(function):

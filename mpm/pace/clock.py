@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm.machine.compile import kernel, kernel_part
+from mpm.machine.compile import allocating_part, kernel
 from mpm.pace.levels import MOST_LEVELS
 
 ALMOST = 1.1  # a step shortened by less to meet an output time counts as limited by what limited it before
@@ -130,7 +130,7 @@ def choose_periods(points, most, periods):
     return steps
 
 
-@kernel_part
+@allocating_part
 def plan_step(clock, pace, limits, start, occupied, n_occupied, element_cuts, level_of_element):
     """Set the clock for a long step that does not lead beyond `times[END]`.
 

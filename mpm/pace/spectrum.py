@@ -195,6 +195,15 @@ def accelerate(i, o, drag_time):
 
 
 @kernel_part
+def dot(dots, k):
+    """Sum of the parts of a dot product."""
+    total = 0.0
+    for part in range(dots.shape[0]):
+        total += dots[part, k]
+    return total
+
+
+@kernel_part
 def product(u, v, first, last):
     """Dot product of a range of two vectors, in four sums that run beside each other."""
     a = b = c = d = 0.0
@@ -260,18 +269,18 @@ def krylov_kernel(needs):
         for part in shared(team, parts):
             first, last = width * o.node_cuts[part], width * o.node_cuts[part + 1]
             for k in range(j + 1):
-                share = o.dots[:, k].sum()
+                share = dot(o.dots, k)
                 for i in range(first, last):
                     flat[j + 1, i] -= share * flat[k, i]
             o.dots[part, -1] = product(flat[j + 1], flat[j + 1], first, last)
         for part in shared(team, parts):
-            norm = np.sqrt(o.dots[:, -1].sum())
+            norm = np.sqrt(dot(o.dots, KRYLOV))
             scale = 1.0 / norm if norm > 0.0 else 0.0
             for i in range(width * o.node_cuts[part], width * o.node_cuts[part + 1]):
                 flat[j + 1, i] *= scale
             if part == 0:
                 for k in range(j + 1):
-                    hessenberg[k, j] = o.dots[:, k].sum()
+                    hessenberg[k, j] = dot(o.dots, k)
                 hessenberg[j + 1, j] = norm
 
     @kernel
@@ -351,11 +360,9 @@ class Spectrum:
         """Ritz values [1/s2], their vectors in the basis, and how far each is from an eigenvalue [1/s2]."""
         self.basis[0] = start.reshape(self.shape) / _norm(start)
         hessenberg, s = np.zeros((KRYLOV + 1, KRYLOV)), self.solver
-        system = s.system()
         s.workers.together(
-            krylov_kernel(s.needs), self._fresh, system.ground, system.medium, self.operator, 0.5 * dt, self.basis,
-            hessenberg,
-        )  # fmt: skip
+            krylov_kernel(s.needs), self._fresh, s.ground, s.medium, self.operator, 0.5 * dt, self.basis, hessenberg
+        )
         self._fresh = False
         size = next((k for k in range(1, KRYLOV) if hessenberg[k, k - 1] == 0.0), KRYLOV)
         values, vectors = np.linalg.eig(hessenberg[:size, :size])

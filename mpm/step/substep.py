@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from mpm.machine.compile import kernel, kernel_part
+from mpm.machine.compile import allocating_part, kernel, kernel_part
 from mpm.machine.team import Team, shared
 from mpm.pace.clock import ALMOST_ALL, END, NOW, SMALLEST, SPAN, plan_step
-from mpm.step.find import follow_points, locate_kernel
+from mpm.step.find import follow_points, locate_kernel, total
 from mpm.step.nodes import remap_kernel, solve_kernel
 from mpm.step.nodes_to_points import advance_kernel
 from mpm.step.points_to_nodes import update_kernel
@@ -45,6 +45,15 @@ class Batch(NamedTuple):
 
 
 @kernel_part
+def all_good(bad):
+    """Whether no part has a bad point."""
+    for part in range(bad.size):
+        if bad[part] >= 0:
+            return False
+    return True
+
+
+@kernel_part
 def lap(team, system, which):
     """Add the processor time since the last look to that of a pass, where it is measured; -1: only look."""
     if system.tally.used.size == 0 or team.thread > 0:
@@ -68,33 +77,33 @@ def points_before(ground, element_cuts, cuts, finished, part):
     return count
 
 
-@kernel_part
+@allocating_part
 def follow(system, finished):
     """Note what the update of a substep found, and repair the list of points."""
     ground, tally, layout = system.ground, system.tally, system.net.layout
     counts = tally.counts
     counts[SUBSTEPS] += 1
     counts[POINT_STEPS] += ground.start[layout.element_cuts[finished + 1]]
-    counts[SUSPENDED] = tally.suspended.sum()
+    counts[SUSPENDED] = total(tally.suspended)
     critical = np.inf
     for part in range(tally.n_left.size):
         critical = min(critical, tally.limits[part, 0])
     courant = system.clock.times[SMALLEST] / critical
     tally.measures[LARGEST_COURANT] = max(tally.measures[LARGEST_COURANT], courant)
-    if tally.n_left.sum() > 0:
+    if total(tally.n_left) > 0:
         counts[OCCUPIED], counts[ACTIVE], removed = follow_points(system, counts[OCCUPIED])
         tally.measures[REMOVED_MASS] += removed
         cut_by_work(ground.start, ground.occupied, counts[OCCUPIED], layout, finished + 1, system.cuts)
 
 
-@kernel_part
+@allocating_part
 def finish(system):
     """The end of a long step."""
     follow(system, system.net.layout.element_cuts.size - 2)
     system.clock.times[NOW] += system.clock.times[SPAN]
 
 
-@kernel_part
+@allocating_part
 def plan(number, batch, system):
     """Begin a long step, if there shall be one more."""
     ground, net, cuts, counts, times = system.ground, system.net, system.cuts, system.tally.counts, system.clock.times
@@ -180,7 +189,7 @@ def long_step_kernel(needs):
                 update(team, part, finished[k], advance, system)
                 lap(team, system, LOCATE)
             lap(team, system, UPDATE)
-            return system.tally.bad.max() < 0
+            return all_good(system.tally.bad)
         return True
 
     @kernel
