@@ -158,6 +158,12 @@ def numbers(records):
     return records.view(np.float64).reshape(*records.shape, -1)
 
 
+def block(records, first, last):
+    """View of the fields of an array of records from one to another: (.., n_names) float64, to read and to write."""
+    names = records.dtype.names
+    return numbers(records)[..., names.index(first) : names.index(last) + 1]
+
+
 def values(records, names):
     """Copy of some fields of an array of records, one after the other: (.., n_names) float64.
 

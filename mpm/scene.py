@@ -10,11 +10,11 @@ import math
 import os
 from functools import cached_property
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Union
 
 from pydantic import Field, SerializeAsAny, WrapValidator, model_validator
 
-from mpm.laws.law import soil_of_its_law
+from mpm.laws.law import built_in_laws, soil_of_its_law
 from mpm.laws.soil import Soil
 from mpm.quantities import Acceleration, Angle, Density, Length, Mass, Part, Pressure, Time, in_unit
 
@@ -56,8 +56,8 @@ class Water(Part):
     drainage: Literal["two-phase", "undrained"] = "two-phase"
 
 
-#: A soil, of the class that its `model` names.
-SoilOfItsLaw = Annotated[SerializeAsAny[Soil], WrapValidator(soil_of_its_law)]
+#: A soil, of the class that its `model` names: one of these, or of a third party.
+SoilOfItsLaw = Annotated[SerializeAsAny[Union[built_in_laws()]], WrapValidator(soil_of_its_law)]  # noqa: UP007
 #: How a lining stands in the ground: held, rigid and free to move, or a homogeneous elastic ring.
 Lining = Literal["fixed", "floating", "elastic"]
 
@@ -402,11 +402,11 @@ class Scene(Part):
                 continue
             depth = max(self._turning_depths(soil, 0.0, math.inf), key=self.vertical_stress)
             lowest, highest = soil.admissible_k0(self.vertical_stress(depth))
-            at_rest = 1 - math.sin(math.radians(soil.friction_angle))
+            at_rest = 1 - math.sin(math.radians(soil.strength[1]))
             raise ValueError(
-                f"soil '{soil.name}': k0 must lie in {max(lowest, 0):.3f} .. {highest:.3f}, what friction_angle "
-                f"{soil.friction_angle:g} deg and cohesion {soil.cohesion:g} Pa bear at {depth:g} m, got {soil.k0:g}, "
-                f"which yields from a depth of {yielding:.3g} m; give more strength, or a k0 that it bears: "
+                f"soil '{soil.name}': k0 must lie in {max(lowest, 0):.3f} .. {highest:.3f}, what {soil.limits} bear at "
+                f"{depth:g} m, got {soil.k0:g}, which yields from a depth of {yielding:.3g} m; give more strength, or a "
+                "k0 that it bears: "
                 f"1 - sin(friction_angle) = {at_rest:.3g} where the ground was never loaded more, or leave k0 out: "
                 "gravity loading within the strength"
             )

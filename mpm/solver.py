@@ -232,9 +232,7 @@ class Solver(Measures):
 
     def _update_wave_speed(self):
         speeds = []
-        for soil, (tightest, loosest, modulus) in zip(
-            self.scene.soils, self.extremes_of_soils().tolist(), strict=True
-        ):
+        for soil, (tightest, loosest, modulus) in zip(self.scene.soils, self.extremes_of_soils().tolist(), strict=True):
             if tightest > loosest:  # no point left
                 continue
             if self.scene.water is None:

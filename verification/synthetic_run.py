@@ -10,8 +10,8 @@ from coupling import datasets
 from coupling.datasets import BALANCES, ERRORS
 from coupling.files.provenance import root_attributes
 from coupling.responses.respond import respond
+from mpm.fields import CLAMPS, POINT
 from mpm.simulation import Record
-from mpm.variables import CLAMPS, POINT
 
 THETA = np.sort(np.concatenate([np.arange(0.0, 360.0, 4.0), [88.3, 90.0, 91.7]]))
 

@@ -1,5 +1,6 @@
 """Laws of soils by name, open to a third party's own, and their functions compiled for a scene."""
 
+import difflib
 import hashlib
 import runpy
 from collections.abc import Iterable
@@ -11,7 +12,14 @@ from typing import Any
 
 import numpy as np
 
+from pydantic_core import PydanticCustomError, ValidationError
+
 from mpm.laws.soil import Soil
+
+
+class UnknownLaw(ValueError):
+    """A soil law that is not there, or a file that gives none."""
+
 
 #: Group of entry points under which an installed package announces its laws: name = "module:Class".
 ENTRY_POINTS = "gush.soil_laws"
@@ -45,7 +53,7 @@ def soil_law(name: str) -> type[Soil]:
 
     Raises
     ------
-    ValueError
+    UnknownLaw
         No such law, file or class.
     """
     if name in _REGISTERED:
@@ -58,16 +66,34 @@ def soil_law(name: str) -> type[Soil]:
     for entry in _installed():
         if entry.name == name:
             return entry.load()
-    raise ValueError(f"model {name!r} must be one of {', '.join(soil_law_names())}; or \"FILE.py:CLASS\", your own")
+    near = difflib.get_close_matches(name.lower(), soil_law_names(), 1)
+    remedy = f"did you mean {near[0]!r}?" if near else "choose one of these, or 'FILE.py:CLASS', your own"
+    raise UnknownLaw(f"must be one of {', '.join(map(repr, soil_law_names()))}, got {name!r}; {remedy}")
+
+
+def built_in_laws() -> tuple[type[Soil], ...]:
+    """Classes of the laws of this folder, that of most scenes first."""
+    return tuple(soil_law(name) for name in sorted(_built_in(), key=lambda name: (name != "mohr-coulomb", name)))
 
 
 def soil_of_its_law(given: Any, validate: Any) -> Soil:
-    """Validator of an entry of `soils`: by the class of the law that its `model` names, else as any soil."""
+    """Validator of an entry of `soils`: by the class of the law that its `model` names.
+
+    Raises
+    ------
+    ValidationError
+        Of that class, or for a law that is not known.
+    """
     if isinstance(given, Soil):
         return type(given).model_validate(given)
     model = given.get("model") if isinstance(given, dict) else None
-    law = soil_law(model) if isinstance(model, str) else None
-    return validate(given) if law is None else law.model_validate(given)
+    if not isinstance(model, str):
+        return soil_law("mohr-coulomb").model_validate(given)
+    try:
+        return soil_law(model).model_validate(given)
+    except UnknownLaw as unknown:
+        wrong = {"type": PydanticCustomError("value_error", str(unknown)), "loc": ("model",), "input": model}
+        raise ValidationError.from_exception_data("Soil", [wrong]) from unknown
 
 
 def soil_table(scene: Any) -> np.ndarray:
@@ -168,13 +194,13 @@ def _is_law(value: Any) -> bool:
 def _from_file(name: str) -> type[Soil]:
     file, _, class_name = name.rpartition(":")
     if not Path(file).is_file():
-        raise ValueError(f"model {name!r}: there is no file '{file}'; check the path")
+        raise UnknownLaw(f"must be a law, got {name!r}: there is no file '{file}'; check the path")
     try:
         law = runpy.run_path(file).get(class_name)
     except Exception as problem:
-        raise ValueError(
-            f"model {name!r}: the file fails with {type(problem).__name__}: {problem}; correct it"
+        raise UnknownLaw(
+            f"must be a law, got {name!r}: the file fails with {type(problem).__name__}: {problem}; correct it"
         ) from problem
     if not _is_law(law):
-        raise ValueError(f"model {name!r}: must be a class derived from mpm.Soil, got {law!r}")
+        raise UnknownLaw(f"must be a class derived from mpm.Soil, got {law!r} of {name!r}; correct the name")
     return law

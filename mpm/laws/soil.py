@@ -91,6 +91,15 @@ class Soil(Part):
             )
         return self
 
+    def model_copy(self, *, update=None, deep=False):
+        """A copy with other values, not validated; of another class and validated where `model` changes."""
+        copy = super().model_copy(update=update, deep=deep)
+        if copy.model == self.model:
+            return copy
+        from mpm.laws.law import soil_law  # which knows all laws
+
+        return soil_law(copy.model).model_validate(copy.model_dump())
+
     # -- what a law gives -----------------------------------------------------------------------
 
     @property

@@ -254,9 +254,7 @@ def update_kernel(needs):
         push = scaled(push, share)
         if runs_ahead:
             push = run_ahead(push, scaled(before, share), ahead)
-        add_forces(
-            shape, push, sums[index(net.rows[e, 0])], sums[index(net.rows[e, 1])], sums[index(net.rows[e, 2])]
-        )
+        add_forces(shape, push, sums[index(net.rows[e, 0])], sums[index(net.rows[e, 1])], sums[index(net.rows[e, 2])])
         for turn in range(1, 4, 2):  # the triangles beside it in its quadrilateral
             beside = (e & ~index(3)) + ((e + index(turn)) & index(3))
             if is_carried(beside, system.ground.start, held.fill):
@@ -295,9 +293,7 @@ def update_kernel(needs):
                 left[moved] = i
                 moved += 1
                 continue
-            v, speed = add_point(
-                point, soil, n0, n1, n2, sums[ia], sums[ib], sums[ic], system.medium.density_liquid
-            )
+            v, speed = add_point(point, soil, n0, n1, n2, sums[ia], sums[ib], sums[ic], system.medium.density_liquid)
             fastest = max(fastest, speed)
             push = with_point(push, v, point, max(point.pore_pressure, 0.0) if wet else 0.0)
             total += v

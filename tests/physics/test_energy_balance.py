@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import mpm
-from mpm.long_step import ADVANCE, FOLLOW, PLAN, REMAP, SOLVE, UPDATE
-from mpm.variables import MASS, S_RHO_S, V_DLX, V_DLY, V_DSX, V_DSY, VLX, VLY, N, X, Y
+from mpm.step.substep import ADVANCE, FOLLOW, PLAN, REMAP, SOLVE, UPDATE
 from verification.small_event import small_scene
 
 
@@ -20,19 +19,21 @@ class Audited(mpm.Solver):
         self._run(ADVANCE, REMAP)
         before = self._pore_water()
         self._run(UPDATE, FOLLOW)
-        speed2 = self.points[:, VLX] ** 2 + self.points[:, VLY] ** 2
+        speed2 = self.points["velocity_liquid_x"] ** 2 + self.points["velocity_liquid_y"] ** 2
         self.uptake += 0.5 * float(np.sum((self._pore_water() - before) * speed2))
 
     def _volume(self):
-        return self.points[:, MASS] / (self.soils[self.soil_of_point, S_RHO_S] * (1 - self.points[:, N]))
+        return self.points["grain_mass"] / (
+            self.soils["grain_density"][self.soil_of_point] * (1 - self.points["porosity"])
+        )
 
     def _pore_water(self):
-        return self.points[:, N] * self._volume() * self._water_density
+        return self.points["porosity"] * self._volume() * self._water_density
 
     def _account(self):
         geometry, corner = self.geometry[self.element_of_point], self.levels.rows[self.element_of_point]
-        dx, dy = self.points[:, X] - geometry[:, 4], self.points[:, Y] - geometry[:, 5]
-        n1, n2 = geometry[:, 0] * dx + geometry[:, 1] * dy, geometry[:, 2] * dx + geometry[:, 3] * dy
+        dx, dy = self.points["x"] - geometry["x"], self.points["y"] - geometry["y"]
+        n1, n2 = geometry["dn1_dx"] * dx + geometry["dn1_dy"] * dy, geometry["dn2_dx"] * dx + geometry["dn2_dy"] * dy
         weight = np.column_stack([1 - n1 - n2, n1, n2])
 
         def at_nodes(values):
@@ -44,14 +45,17 @@ class Audited(mpm.Solver):
             return 0.5 * float(np.sum(at_nodes(mass) * change**2) - np.sum(mass * at_points**2))
 
         full, pore = self._volume() * self._water_density, self._pore_water()
-        for grains, water, liquid in ((V_DSX, V_DLX, VLX), (V_DSY, V_DLY, VLY)):
-            self.spread += spread(self.points[:, MASS], self.nodes[:, grains])
-            self.spread += spread(pore, self.nodes[:, water])
+        for grains, water, liquid in (
+            ("change_solid_x", "change_liquid_x", "velocity_liquid_x"),
+            ("change_solid_y", "change_liquid_y", "velocity_liquid_y"),
+        ):
+            self.spread += spread(self.points["grain_mass"], self.nodes[grains])
+            self.spread += spread(pore, self.nodes[water])
             # nodes know the mean velocity of water as if it filled all, and the mass of pore water
-            carried, momentum = at_nodes(full), at_nodes(full * self.points[:, liquid])
+            carried, momentum = at_nodes(full), at_nodes(full * self.points[liquid])
             mean = np.divide(momentum, carried, out=np.zeros(len(carried)), where=carried > 0)
-            change = at_nodes(pore) * mean - at_nodes(pore * self.points[:, liquid])
-            self.covariance += float(np.sum(change * self.nodes[:, water]))
+            change = at_nodes(pore) * mean - at_nodes(pore * self.points[liquid])
+            self.covariance += float(np.sum(change * self.nodes[water]))
 
 
 def test_energy_lost_by_pure_flip_is_spread_over_points_less_what_water_they_take_up():

@@ -6,8 +6,8 @@ from scipy.special import erfc
 
 import coupling
 import mpm
+from mpm.fields import values
 from mpm.points import initial_stress
-from mpm.variables import SXX, SXY, VLY, VSX, X0, Y0, P, Y
 from verification.small_event import COARSE
 from verification.stability.amplification import Column
 
@@ -47,8 +47,8 @@ def test_initial_pressures_are_the_theoretical_ones_at_every_angle(closed_case_3
 def test_lining_carries_the_uplift_of_the_displaced_ground(closed_case_3):
     scene, solver = closed_case_3
     part = solver.lining[0]
-    normal, reaction = solver.normal[part.rows], solver.impulse[part.rows]
-    vertical = -(reaction[:, 0] + reaction[:, 1]) * normal[:, 1] + reaction[:, 2] * normal[:, 0]
+    wall, reaction = solver.contact[part.rows], solver.impulse[part.rows]
+    vertical = -(reaction["soil"] + reaction["water"]) * wall["normal_y"] + reaction["shear"] * wall["normal_x"]
     soil = scene.soils[0]
     weight = 9.81 * ((1 - soil.porosity) * soil.grain_density + soil.porosity * scene.water.density)
     position = solver.mesh.nodes[solver.mesh.outer_nodes[0]]
@@ -67,9 +67,17 @@ def test_ground_with_a_rough_lining_stays_at_rest():
     before = solver.points.copy()
     for _ in range(500):
         solver.step()
-    change = np.abs(solver.points[:, P : SXY + 1] - before[:, P : SXY + 1]).max()
-    assert change < 1e-6 * before[:, P].max()
-    assert np.abs(solver.points[:, VSX : VLY + 1]).max() < 1e-9  # m/s: round-off of 5e5 Pa over 500 steps
+    change = np.abs(
+        values(solver.points, ("pore_pressure", "porosity", "stress_xx", "stress_yy", "stress_zz", "stress_xy"))
+        - values(before, ("pore_pressure", "porosity", "stress_xx", "stress_yy", "stress_zz", "stress_xy"))
+    ).max()
+    assert change < 1e-6 * before["pore_pressure"].max()
+    assert (
+        np.abs(
+            values(solver.points, ("velocity_solid_x", "velocity_solid_y", "velocity_liquid_x", "velocity_liquid_y"))
+        ).max()
+        < 1e-9
+    )  # m/s: round-off of 5e5 Pa over 500 steps
     lining = solver.lining_pressures(solver.time)[0]
     soil, _water, _, _ = theory(scene, lining["theta"])
     assert np.all(np.isfinite(lining["soil_pressure"])) and soil.min() > 0
@@ -81,12 +89,15 @@ def change_in(solver, time):
     while solver.time < time * (1 - 1e-12):
         solver.advance(time)
     after = by_place(solver)
-    pressures = np.maximum(after[:, P], 0.0) - np.maximum(before[:, P], 0.0)
-    return np.abs(pressures).max(), np.abs(after[:, SXX : SXY + 1] - before[:, SXX : SXY + 1]).max()
+    pressures = np.maximum(after["pore_pressure"], 0.0) - np.maximum(before["pore_pressure"], 0.0)
+    return np.abs(pressures).max(), np.abs(
+        values(after, ("stress_xx", "stress_yy", "stress_zz", "stress_xy"))
+        - values(before, ("stress_xx", "stress_yy", "stress_zz", "stress_xy"))
+    ).max()
 
 
 def by_place(solver):
-    return solver.points[np.lexsort((solver.points[:, X0], solver.points[:, Y0]))]
+    return solver.points[np.lexsort((solver.points["x_initial"], solver.points["y_initial"]))]
 
 
 @pytest.mark.parametrize("depth", [0.0, 10.0])
@@ -115,15 +126,15 @@ def test_water_that_hangs_above_the_table_seeps_into_it():
     scene = scene.model_copy(update={"water": scene.water.model_copy(update={"table_depth": 10.0})})
     solver = mpm.Solver(scene, column.mesh(), threads=1)
     time, weight = 5.0, 9.81 * scene.water.density
-    before = by_place(solver)[:, P]
+    before = by_place(solver)["pore_pressure"]
     change_in(solver, time)
     points, soil = by_place(solver), scene.soils[0]
     nu = soil.poissons_ratio
     oedometric = soil.youngs_modulus * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
     storage = soil.porosity / scene.water.bulk_modulus + 1 / oedometric
     diffusivity = soil.hydraulic_conductivity / (weight * storage)
-    z, spread = np.abs(points[:, Y] + 10.0), np.sqrt(diffusivity * time)
+    z, spread = np.abs(points["y"] + 10.0), np.sqrt(diffusivity * time)
     rise = weight * (spread / np.sqrt(np.pi) * np.exp(-((z / spread / 2) ** 2)) - z / 2 * erfc(z / spread / 2))
     near = z < 4.0
-    error = points[near, P] - before[near] - rise[near]
+    error = points["pore_pressure"][near] - before[near] - rise[near]
     assert np.abs(error).max() < 0.01 * rise.max()

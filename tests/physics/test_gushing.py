@@ -10,8 +10,8 @@ import coupling
 import mpm
 import mpm.scene
 import mpm.solver
+from mpm.fields import values
 from mpm.simulation import STEPS_BETWEEN_CHECKS
-from mpm.variables import MASS, VSX, VSY, X, Y
 
 pytestmark = pytest.mark.slow
 
@@ -104,7 +104,7 @@ def test_run_that_goes_wrong_names_cause_time_and_place():
     solver.relax()
     solver.open_gate()
     solver.step()
-    solver.points[1000, VSX] = np.nan
+    solver.points["velocity_solid_x"][1000] = np.nan
     with pytest.raises(mpm.RunFailed) as failure:
         solver.step()
     assert "non-finite" in str(failure.value) and failure.value.time == solver.time
@@ -116,8 +116,8 @@ def test_run_with_a_point_faster_than_weight_can_make_it_stops_as_unstable():
     simulation.begin()
     while simulation.solver.step_count < 2 * STEPS_BETWEEN_CHECKS:  # without the push it goes on
         simulation.advance()
-    simulation.solver.points[1000, VSX : VSY + 1] = 2e3
-    place = simulation.solver.points[1000, X : Y + 1].copy()
+    simulation.solver.points[["velocity_solid_x", "velocity_solid_y"]][1000] = 2e3
+    place = values(simulation.solver.points[1000], ("x", "y")).copy()
     with pytest.raises(mpm.RunFailed, match="unstable") as failure:
         while not simulation.done:
             simulation.advance()
@@ -129,16 +129,16 @@ def test_sink_takes_material_out_and_counts_it():
     scene = quick(interior="sink", stop=mpm.scene.Stop(time=0.25))
     mesh = mpm.build_mesh(scene)
     solver = mpm.Solver(scene, mesh)
-    total = np.sum(solver.points[:, MASS])
+    total = np.sum(solver.points["grain_mass"])
     solver.relax()
     solver.open_gate()
     while solver.time < 0.25:
         solver.step()
     gone = solver.element_of_point < 0
     tunnel = scene.tunnels[0]
-    radius = np.hypot(solver.points[:, X] - tunnel.x, solver.points[:, 1] + tunnel.axis_depth)
+    radius = np.hypot(solver.points["x"] - tunnel.x, solver.points[:, 1] + tunnel.axis_depth)
     # what has passed the inner face's circle, but not yet the edge of its polygon, is inside as well
-    came = np.sum(solver.points[gone | (radius < tunnel.inner_radius), MASS])
+    came = np.sum(solver.points["grain_mass"][gone | (radius < tunnel.inner_radius)])
     assert gone.any() and solver.inflow_mass() == pytest.approx(came, rel=1e-12)
-    assert np.sum(solver.points[:, MASS]) == pytest.approx(total, rel=1e-12)
+    assert np.sum(solver.points["grain_mass"]) == pytest.approx(total, rel=1e-12)
     assert radius[~gone].min() > 0.98 * tunnel.inner_radius

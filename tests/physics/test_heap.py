@@ -3,9 +3,9 @@
 import numpy as np
 
 from coupling.postprocess import filled
+from mpm.fields import values
 from mpm.scene import Scene
 from mpm.solver import Solver
-from mpm.variables import MASS, SXX, SXY, SYY, SZZ, VSX, VSY, P
 from verification.problems import boxes
 
 GRAIN_DENSITY, POROSITY, LOOSE = 2650.0, 0.45, 0.55
@@ -39,23 +39,23 @@ def dropped_block(width=1.6, size=0.1):
         "output": {"interval": 1.0},
     })  # fmt: skip
     solver = Solver(scene, box_mesh(width, 2.0, size, (-0.3, 0.3, -1.7, -1.1)))
-    solver.points[:, [P, SXX, SYY, SZZ, SXY]] = 0.0
+    solver.points[["pore_pressure", "stress_xx", "stress_yy", "stress_zz", "stress_xy"]] = 0.0
     return solver
 
 
 def test_dropped_block_lands_and_takes_up_the_area_its_grains_need():
     solver = dropped_block()
-    mass = np.sum(solver.points[:, MASS])
+    mass = np.sum(solver.points["grain_mass"])
     fastest = 0.0
     while solver.time < 6.0:  # its slopes slide a little now and then until 5 s
         solver.step()
         fastest = max(fastest, speed(solver)) if solver.step_count % 100 == 0 else fastest
     assert fastest > 0.7 * np.sqrt(2 * 9.81 * 0.3)  # it did fall
     assert speed(solver) < 0.02 * fastest
-    assert np.sum(solver.points[:, MASS]) == mass
-    element, area = solver.element_of_point, solver.geometry[:, 6]
+    assert np.sum(solver.points["grain_mass"]) == mass
+    element, area = solver.element_of_point, solver.geometry["area"]
     volume = np.bincount(element, solver.points_by_name()["volume"], len(area))
-    solid = np.bincount(element, solver.points[:, MASS] / GRAIN_DENSITY, len(area))
+    solid = np.bincount(element, solver.points["grain_mass"] / GRAIN_DENSITY, len(area))
     heap = filled(volume, area, solver.mesh.elements)
     # the rest lies in elements of the surface that are less than half full
     assert solid[heap].sum() > 0.9 * mass / GRAIN_DENSITY
@@ -65,4 +65,4 @@ def test_dropped_block_lands_and_takes_up_the_area_its_grains_need():
 
 def speed(solver):
     """Root mean square of the grains' velocity [m/s]."""
-    return float(np.sqrt(np.mean(np.sum(solver.points[:, VSX : VSY + 1] ** 2, axis=1))))
+    return float(np.sqrt(np.mean(np.sum(values(solver.points, ("velocity_solid_x", "velocity_solid_y")) ** 2, axis=1))))

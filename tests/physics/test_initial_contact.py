@@ -31,7 +31,7 @@ def share_beyond(k0, friction):
 
 
 def shear_and_friction(solver):
-    return np.abs(solver.impulse[:, 2]), solver.friction * solver.impulse[:, 0]
+    return np.abs(solver.impulse["shear"]), solver.contact["friction"] * solver.impulse["soil"]
 
 
 def test_bonded_ground_beyond_friction_slips_before_the_gate_opens_and_stays_after():

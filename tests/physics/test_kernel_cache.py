@@ -12,7 +12,7 @@ pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
 VARIANTS = """
 import sys
-from mpm.jit import kernel
+from mpm.machine.compile import kernel
 def scaled(factor):
     @kernel
     def inner(x):
@@ -29,7 +29,7 @@ for factor in map(float, sys.argv[1:]):
 EVENT = """
 import hashlib, inspect
 import mpm
-import mpm.contact, mpm.meeting, mpm.points, mpm.spectrum, mpm.stages
+import mpm.machine.team, mpm.pace.spectrum, mpm.points, mpm.relaxation
 import sys; sys.path.insert(0, "tests")
 from verification.small_event import small_scene
 scene = small_scene()
@@ -38,9 +38,10 @@ solver.relax()
 solver.open_gate()
 for _ in range(40):
     solver.step()
-kernels = [v for m in (mpm.contact, mpm.meeting, mpm.points, mpm.spectrum, mpm.stages) for v in vars(m).values()]
+modules = mpm.machine.team, mpm.pace.spectrum, mpm.points, mpm.relaxation
+kernels = [v for m in modules for v in vars(m).values()]
 kernels += [solver._long_step, *inspect.getclosurevars(solver._long_step.py_func).nonlocals.values()]
-kernels += [mpm.spectrum.krylov_kernel(True)]
+kernels += [mpm.pace.spectrum.krylov_kernel(solver.needs)]
 kernels = {k.py_func.__qualname__: k for k in kernels if hasattr(k, "py_func")}
 print(len(kernels), max(len(k.signatures) for k in kernels.values()),
       *(name for name, k in kernels.items() if k.stats.cache_misses))
@@ -109,7 +110,7 @@ def test_kernels_that_kernels_call_are_one_piece_of_machine_code_with_them(progr
     # more with their caller in those that load it: other bits. This one is too long to be written out unasked.
     terms = "\n        ".join(f"x = factor * x + {k}.0 / (x * x + {k + 1}.0)" for k in range(150))
     (tmp_path / "variants.py").write_text(f"""
-from mpm.jit import kernel
+from mpm.machine.compile import kernel
 def kernels(factor):
     @kernel
     def inner(x):

@@ -9,46 +9,25 @@ import coupling.datasets
 import mpm
 import mpm.scene
 from coupling.scenes.features import features
-from mpm.clock import Clock
-from mpm.contact import one_velocity_kernel, solve_nodes
-from mpm.system import Medium, Net, System, Tally, Walls
-from mpm.variables import (
-    B_D,
-    B_FLX,
-    B_FLY,
-    B_FX,
-    B_FY,
-    B_ML,
-    B_MN,
-    B_MS,
-    B_PLX,
-    B_PLY,
-    B_PSX,
-    B_PSY,
-    BUFFER_WIDTH,
-    EQ,
-    LEDGER,
-    NODE_WIDTH,
-    SXX,
-    SXY,
-    SYY,
-    SZZ,
-    V_SX,
-    V_SY,
-    VLX,
-    VLY,
-    VSX,
-    VSY,
-    P,
-    X,
-    Y,
-)  # fmt: skip
+from mpm.fields import (
+    CONTACT_RECORD,
+    LEDGER_RECORD,
+    NODE_RECORD,
+    REACTION_RECORD,
+    SUM_RECORD,
+    TIED_RECORD,
+    block,
+    values,
+)
+from mpm.pace.clock import Clock
+from mpm.step.nodes import solve_kernel
+from mpm.step.system import Medium, Needs, Net, System, Tally, Walls
 from verification.small_event import small_scene
 
 pytestmark = pytest.mark.slow
 
-MOTION = [X, Y, VSX, VSY, EQ]
-STRESS = [SXX, SYY, SZZ, SXY]
+MOTION = ("x", "y", "velocity_solid_x", "velocity_solid_y", "deviatoric_strain")
+STRESS = ("stress_xx", "stress_yy", "stress_zz", "stress_xy")
 
 
 def scene(**changes):
@@ -59,7 +38,7 @@ def stepped(case, steps=60, weightless=False):
     """Points after some steps with the gate open, one thread."""
     solver = mpm.Solver(case, mpm.build_mesh(case), threads=1)
     if weightless:
-        solver.points[:, P] = 0.0
+        solver.points["pore_pressure"] = 0.0
     solver.relax()
     solver.open_gate()
     for _ in range(steps):
@@ -72,7 +51,7 @@ def test_dry_scene_is_the_limit_of_water_without_weight_and_stiffness():
     # no validated scene can have such water: its bulk modulus and density are bounded from below
     nothing = mpm.scene.Water.model_construct(table_depth=0.0, density=1e-9, bulk_modulus=0.0)
     wet = stepped(scene(water=nothing), weightless=True)
-    moved = np.hypot(dry.points[:, VSX], dry.points[:, VSY]).max()
+    moved = np.hypot(dry.points["velocity_solid_x"], dry.points["velocity_solid_y"]).max()
     assert moved > 1e-3
     assert np.abs(dry.points[:, MOTION] - wet.points[:, MOTION]).max() < 1e-9
     scale = np.abs(dry.points[:, STRESS]).max()
@@ -122,7 +101,7 @@ def test_frictionless_scene_is_the_limit_of_vanishing_friction():
         for mu in (0.0, 1e-12)
     ]
     smooth, rough = states
-    assert not smooth.impulse[:, 2].any() and smooth.impulse[:, 0].any() and rough.impulse[:, 2].any()
+    assert not smooth.impulse["shear"].any() and smooth.impulse["soil"].any() and rough.impulse["shear"].any()
     # the shear is 1e-12 of the pressure, and 60 steps and the relaxation add it up
     scale = np.abs(smooth.points[:, STRESS]).max()
     assert np.abs(smooth.points[:, STRESS] - rough.points[:, STRESS]).max() < 1e-8 * scale
@@ -135,11 +114,14 @@ def test_undrained_ground_needs_no_smaller_step_and_is_the_limit_of_falling_perm
         stepped(scene(soils=(soil.model_copy(update={"hydraulic_conductivity": k}),)), steps=30) for k in (1e-9, 1e-12)
     ]
     for state in states:
-        apart = np.hypot(state.points[:, VSX] - state.points[:, VLX], state.points[:, VSY] - state.points[:, VLY])
-        moved = np.hypot(state.points[:, VSX], state.points[:, VSY]).max()
+        apart = np.hypot(
+            state.points["velocity_solid_x"] - state.points["velocity_liquid_x"],
+            state.points["velocity_solid_y"] - state.points["velocity_liquid_y"],
+        )
+        moved = np.hypot(state.points["velocity_solid_x"], state.points["velocity_solid_y"]).max()
         assert moved > 1e-3 and apart.max() < 1e-3 * moved  # one velocity, though two are carried
     low, lower = (state.points for state in states)
-    assert np.abs(low[:, P] - lower[:, P]).max() < 1e-3 * lower[:, P].max()
+    assert np.abs(low["pore_pressure"] - lower["pore_pressure"]).max() < 1e-3 * lower["pore_pressure"].max()
     steps = [state.time_step_estimate()[0] for state in states]
     assert steps[0] == pytest.approx(steps[1], rel=0.02)  # the spectrum is known to a hundredth
 
@@ -153,54 +135,69 @@ def undrained(**changes):
 def test_undrained_scene_is_the_limit_of_falling_permeability():
     soil = scene().soils[0].model_copy(update={"hydraulic_conductivity": 1e-12})
     one, two = stepped(undrained()), stepped(scene(soils=(soil,)))
-    moved = np.hypot(two.points[:, VSX], two.points[:, VSY]).max()
+    moved = np.hypot(two.points["velocity_solid_x"], two.points["velocity_solid_y"]).max()
     assert moved > 1.0
-    assert np.array_equal(one.points[:, [VLX, VLY]], one.points[:, [VSX, VSY]])
+    assert np.array_equal(
+        values(one.points, ("velocity_liquid_x", "velocity_liquid_y")),
+        values(one.points, ("velocity_solid_x", "velocity_solid_y")),
+    )
     # where the lining is, away from the gate, porosity is uniform: one weight, one velocity, a few roundings of k
-    for column in range(3):
-        assert np.abs(one.impulse[:, column] - two.impulse[:, column]).max() < 1e-6 * two.impulse[:, column].max()
+    for name in ("soil", "water", "shear"):
+        assert np.abs(one.impulse[name] - two.impulse[name]).max() < 1e-6 * two.impulse[name].max()
     # at the gate two velocities are mapped with two weights (grains, volume) that differ with the porosity, and the
     # water's remapped one slides along walls on which grains stick: differences of points within 0.1 m of the gate's
     # corner, 1.0e-3, 3.7e-3 and 6e-4; of 99 in 100 points less than 2e-4
-    for columns, most in ((MOTION[2:4], 2e-3), (STRESS, 4e-3), ([P], 3e-3)):
-        scale = np.abs(two.points[:, columns]).max()
-        difference = np.abs(one.points[:, columns] - two.points[:, columns]).max(axis=1)
+    for columns, most in ((MOTION[2:4], 2e-3), (STRESS, 4e-3), (("pore_pressure",), 3e-3)):
+        scale = np.abs(values(two.points, columns)).max()
+        difference = np.abs(values(one.points, columns) - values(two.points, columns)).max(axis=1)
         assert difference.max() < most * scale and np.quantile(difference, 0.99) < 2e-4 * scale, columns
 
 
 def test_wall_pushes_an_undrained_mixture_as_two_tied_phases():
     """Random nodes at a wall: reactions and velocities of the limit of infinite drag of two momentum equations."""
     n, random = 400, np.random.default_rng(2)
-    sums = np.zeros((1, n, BUFFER_WIDTH))
-    sums[0, :, B_MS], sums[0, :, B_ML] = random.uniform(1, 2, n), random.uniform(0.5, 1, n)
-    sums[0, :, B_MN], sums[0, :, B_D] = 0.45 * sums[0, :, B_ML], 1e16
-    speed, force = random.normal(size=(2, n)), random.normal(size=(4, n)) * 1e3
-    sums[0, :, [B_PSX, B_PSY]], sums[0, :, [B_PLX, B_PLY]] = speed * sums[0, :, B_MS], speed * sums[0, :, B_ML]
-    sums[0, :, [B_FX, B_FY, B_FLX, B_FLY]] = force
+    sums = np.zeros((1, n), SUM_RECORD)
+    row = sums[0]
+    row["mass_solid"], row["mass_liquid"] = random.uniform(1, 2, n), random.uniform(0.5, 1, n)
+    row["mass_pore_liquid"], row["drag"] = 0.45 * row["mass_liquid"], 1e16
+    speed = random.normal(size=(2, n))
+    block(row, "momentum_solid_x", "momentum_solid_y")[:] = (speed * row["mass_solid"]).T
+    block(row, "momentum_liquid_x", "momentum_liquid_y")[:] = (speed * row["mass_liquid"]).T
+    block(row, "force_x", "force_liquid_y")[:] = 1e3 * random.normal(size=(n, 4))
     angle = random.uniform(0, 2 * np.pi, n)
-    normal = np.column_stack([np.cos(angle), np.sin(angle)])
-    row = np.arange(n, dtype=np.int32)
+    contact = np.zeros(n, CONTACT_RECORD)
+    contact["normal_x"], contact["normal_y"], contact["active"], contact["friction"] = (
+        np.cos(angle),
+        np.sin(angle),
+        1,
+        0.2,
+    )
+    numbered = np.arange(n, dtype=np.int32)
     found = []
-    for solve, mixed in ((solve_nodes, False), (one_velocity_kernel(True), True)):
+    for two_phase in (True, False):
         given = sums.copy()
-        if mixed:
-            given[0, :, [B_PSX, B_PSY]] = speed * (sums[0, :, B_MS] + sums[0, :, B_MN])
-        nodes, impulse, ledger = np.zeros((n, NODE_WIDTH)), np.zeros((n, 5)), np.zeros(len(LEDGER))
+        if not two_phase:
+            mixture = speed * (row["mass_solid"] + row["mass_pore_liquid"])
+            block(given[0], "momentum_solid_x", "momentum_solid_y")[:] = mixture.T
+        nodes, impulse, ledger = np.zeros(n, NODE_RECORD), np.zeros(n, REACTION_RECORD), np.zeros(1, LEDGER_RECORD)
+        still, nowhere = np.zeros((n, 2)), np.zeros((0, 2))
         system = System(**dict.fromkeys(System._fields) | {
             "net": Net(**dict.fromkeys(Net._fields) | {
-                "which_node": row, "next_row": np.full(n, -1, np.int32), "level_of_row": np.zeros(n, np.int8),
-                "touched": np.ones((1, n), np.uint8), "sums": given, "tied_means": np.zeros((0, 6)), "nodes": nodes,
-                "status": np.zeros(n, np.int8),
+                "which_node": numbered, "next_row": np.full(n, -1, np.int32), "level_of_row": np.zeros(n, np.int8),
+                "touched": np.ones((1, n), np.uint8), "sums": given, "tied_means": np.zeros(0, TIED_RECORD),
+                "nodes": nodes, "status": np.zeros(n, np.int8),
             }),
-            "walls": Walls(np.zeros(n, np.int8), row, normal, np.ones(n, np.int8), np.full(n, 0.2), None, impulse),
+            "walls": Walls(np.zeros(n, np.int8), numbered, contact, still, impulse, nowhere),
             "clock": Clock(**dict.fromkeys(Clock._fields) | {"dt_of_level": np.array([1e-3])}),
             "medium": Medium(9.81, 1000.0, 8e7),
-            "tally": Tally(**dict.fromkeys(Tally._fields) | {"ledger": ledger[None]}),
+            "tally": Tally(**dict.fromkeys(Tally._fields) | {"ledger": ledger}),
         })  # fmt: skip
         # a kernel's part has no code of its own to call
-        numba.njit(error_model="numpy")(solve.py_func)(0, n, 0, 0, None, system)
-        assert ledger[6] < 1e-12 * ledger[7]  # reactions explain the change of momentum
-        found.append((nodes[:, [V_SX, V_SY]], impulse / 1e-3))
+        needs = Needs(True, two_phase, tied=False, moving=False, held_pressure=False, laws=("elastic",))
+        numba.njit(error_model="numpy")(solve_kernel(needs).py_func)(0, n, 0, 0, system)
+        assert ledger["unexplained"] < 1e-12 * ledger["reactions"]
+        reactions = values(impulse, ("soil", "water", "shear")) / 1e-3
+        found.append((values(nodes, ("velocity_solid_x", "velocity_solid_y")), reactions))
     (two, of_two), (one, of_one) = found
     kinds = [(of_two[:, 0] > 0) & (of_two[:, 1] > 0), (of_two[:, 0] > 0) & (of_two[:, 1] == 0)]
     kinds += [(of_two[:, 0] == 0) & (of_two[:, 1] > 0), (of_two[:, :2] == 0).all(axis=1)]

@@ -5,7 +5,7 @@ import pytest
 
 import coupling
 import mpm
-from mpm.variables import MASS, S_RHO_S, VLX, VLY, VSX, VSY, N, X, Y
+from mpm.fields import block, values
 from verification.problems.boxes import box_mesh
 from verification.problems.driven import box_scene
 from verification.small_event import COARSE
@@ -34,18 +34,18 @@ def shaken(scene, mesh, amplitude=1e-4):
     solver = mpm.Solver(scene, mesh, threads=1)
     rng = np.random.default_rng(1)
     wave, phase = rng.standard_normal((40, 2)), 2 * np.pi * rng.random(40)
-    shape = np.cos(solver.points[:, X : Y + 1] @ wave.T + phase)
+    shape = np.cos(values(solver.points, ("x", "y")) @ wave.T + phase)
     velocity = amplitude * shape @ rng.standard_normal((40, 2))
-    solver.points[:, VSX : VSY + 1] = velocity
+    block(solver.points, "velocity_solid_x", "velocity_solid_y")[:] = velocity
     if scene.water is not None:
-        solver.points[:, VLX : VLY + 1] = velocity
+        block(solver.points, "velocity_liquid_x", "velocity_liquid_y")[:] = velocity
     solver.initial = solver.sums_over_points()
     return solver
 
 
 def test_every_level_steps_within_the_limit_of_its_elements(mesh):
     solver = mpm.Solver(elastic_scene(True), mesh)
-    levels, elements, altitude = solver.levels, solver.mesh.elements, solver.geometry[:, 7]
+    levels, elements, altitude = solver.levels, solver.mesh.elements, solver.geometry["altitude"]
     assert levels.count >= 5
     # Level 0 begins between half and all of the smallest altitude; each further one at twice the altitude.
     assert (altitude >= 0.5 * altitude.min() * 2.0**levels.of_element).all()
@@ -74,12 +74,17 @@ def test_momentum_is_conserved_across_levels(mesh, wet):
         solver.step()
     assert solver.step_count >= 20 * 2 ** (solver.levels.count - 2)
     points, ledger = solver.points, solver.ledger.sum(axis=0)
-    grains = points[:, MASS]
-    momentum = np.array([grains @ points[:, VSX], grains @ points[:, VSY]])
+    grains = points["grain_mass"]
+    momentum = np.array([grains @ points["velocity_solid_x"], grains @ points["velocity_solid_y"]])
     if wet:
-        porosity = points[:, N]
-        water = scene.water.density * porosity * grains / (solver.soils[solver.soil_of_point, S_RHO_S] * (1 - porosity))
-        momentum += [water @ points[:, VLX], water @ points[:, VLY]]
+        porosity = points["porosity"]
+        water = (
+            scene.water.density
+            * porosity
+            * grains
+            / (solver.soils["grain_density"][solver.soil_of_point] * (1 - porosity))
+        )
+        momentum += [water @ points["velocity_liquid_x"], water @ points["velocity_liquid_y"]]
     change = momentum - solver.initial["momentum"]
     # Grains: rounding of sums over 1e4 points and 1e3 steps. Water: its mass in a point follows the porosity, which
     # changes by strains of 1e-6 here.
@@ -126,12 +131,12 @@ def pulse_error(local, courant=0.8, coarse=0.4, fine=0.1):
         ways = (speed * t, -speed * t)
         return 0.5 * sum(pulse(y - way) + pulse(-y - way) - pulse(-48.0 - y - way) for way in ways)
 
-    solver.points[:, VSY] = pulse(solver.points[:, Y])
+    solver.points["velocity_solid_y"] = pulse(solver.points["y"])
     end = 6.0 / speed
     while solver.time < end * (1 - 1e-12):
         solver.step(end - solver.time)
-    answer = exact(solver.points[:, Y], end)
-    return float(np.sqrt(np.mean((solver.points[:, VSY] - answer) ** 2) / np.mean(answer**2)))
+    answer = exact(solver.points["y"], end)
+    return float(np.sqrt(np.mean((solver.points["velocity_solid_y"] - answer) ** 2) / np.mean(answer**2)))
 
 
 def test_wave_runs_through_the_border_of_levels():

@@ -6,8 +6,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from mpm.jit import kernel, kernel_part
-from mpm.meeting import meeting_width, next_part, next_stage, stage_at_hand, take_part
+from mpm.machine.compile import kernel, kernel_part
+from mpm.machine.team import meeting_width, next_part, next_stage, stage_at_hand, take_part
 
 MOST_PARTS, STAGES = 5, 400
 

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 import coupling
 from mpm.element_size import element_size
-from mpm.levels import element_levels
 from mpm.mesh import CHANNEL, HEADROOM, INTERIOR, SOIL, Mesh, MeshError, altitudes, angles, areas
 from mpm.meshing import build_mesh
+from mpm.pace.levels import element_levels
 from mpm.scene import Scene
 
 # Coordinates up to 60 m in double precision: a few units in the last place.

@@ -22,7 +22,6 @@ from coupling.runs.run import run
 from mpm import simulate
 from mpm.errors import COMPARED, errors, largest_so_far
 from mpm.scene import Numerics, Stop
-from mpm.variables import MASS, Y0
 from verification.small_event import small_scene
 from verification.synthetic_run import make_quick_scene
 
@@ -35,7 +34,7 @@ def test_fall_turns_the_work_of_gravity_into_motion():
     while solver.time < 0.2:
         solver.step(0.2 - solver.time)
     balances = solver.balances()
-    grains = solver.points[:, MASS].sum()
+    grains = solver.points["grain_mass"].sum()
     mass = grains + solver.initial["water"]
     # m g h with h = g t^2/2; 1e-12: no stress, no drag, no wall, so only rounding
     assert balances["work_gravity"] == pytest.approx(mass * 9.81 * 0.5 * 9.81 * 0.2**2, rel=1e-12)
@@ -95,8 +94,8 @@ def test_overlap_is_what_a_cell_holds_beyond_its_area():
     assert solver.flow_amounts()["overlap_volume"] == 0.0
     one = cells == cells[0]
     area = solver._volumes()[one].sum()
-    solver.points[one, MASS] *= 1.25
-    solver.points[np.flatnonzero(one)[: one.sum() // 2], Y0] += 1.0  # half of its points came from elsewhere
+    solver.points["grain_mass"][one] *= 1.25
+    solver.points["y_initial"][np.flatnonzero(one)[: one.sum() // 2]] += 1.0  # half of its points came from elsewhere
     amounts = solver.flow_amounts()
     assert amounts["overlap_volume"] == pytest.approx(0.25 * area, rel=1e-9)
     assert amounts["flow_overlap_volume"] == pytest.approx(0.125 * area, rel=1e-9)

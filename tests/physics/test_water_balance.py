@@ -6,9 +6,13 @@ from test_heap import box_mesh
 
 import coupling
 import mpm
+from mpm.fields import (
+    CLAMPS,
+    block,
+    values,
+)
 from mpm.scene import Scene
 from mpm.solver import Solver
-from mpm.variables import B_FLX, B_FLY, B_FX, B_FY, CLAMPS, SXX, SXY, SYY, SZZ, VLX, VLY, VSX, VSY, N, P, X, Y
 
 pytestmark = pytest.mark.slow
 
@@ -33,21 +37,21 @@ def full_box(drainage="two-phase", **numerics):
         "output": {"interval": 1.0},
     })  # fmt: skip
     solver = Solver(scene, box_mesh(2.0, 1.0, 0.1, (-1.0, 1.0, -1.0, 0.0)), threads=1)
-    solver.points[:, [SXX, SYY, SZZ, SXY]] = 0.0
-    solver.points[:, P] = 1e5
+    solver.points[["stress_xx", "stress_yy", "stress_zz", "stress_xy"]] = 0.0
+    solver.points["pore_pressure"] = 1e5
     return solver
 
 
 def test_filter_fills_dry_points_with_what_it_takes_from_wet_ones():
     solver = full_box()
     rng = np.random.default_rng(1)
-    solver.points[:, P] = rng.uniform(-1e5, 1e5, solver.n_points)
-    before = solver.points[:, P].copy()
+    solver.points["pore_pressure"] = rng.uniform(-1e5, 1e5, solver.n_points)
+    before = solver.points["pore_pressure"].copy()
     for _ in range(5):
         solver.step(1e-12)  # nothing moves: the filter alone
-    change = solver.points[:, P] - before
+    change = solver.points["pore_pressure"] - before
     assert np.abs(change[before > 0]).max() > 1e3 and change[before < -5e4].max() > 1e3
-    weight = solver.points[:, N] * solver._volumes()
+    weight = solver.points["porosity"] * solver._volumes()
     # what p says of the water, n V p/K_w: conserved to rounding, and to what moves in 5e-12 s
     assert abs(np.sum(weight * change)) < 1e-9 * np.sum(np.abs(weight * change))
 
@@ -59,12 +63,12 @@ def test_filter_leaves_alone_what_points_on_a_line_can_not_tell():
     across = solver.mesh.nodes[solver.mesh.elements[4 * cell + 2, 0]]
     # those of two elements gather at one corner of the cell, those of the others at the corner opposite to it
     near = np.where((solver.element_of_point % 4 % 3 == 0)[:, None], corners[:, 0], across)
-    rows[:, X : Y + 1] = near
+    block(rows, "x", "y")[:] = near
     rng = np.random.default_rng(1)
-    rows[:, P] = before = rng.uniform(1e4, 1e5, solver.n_points)
+    rows["pore_pressure"] = before = rng.uniform(1e4, 1e5, solver.n_points)
     solver.step(1e-12)
     assert np.isfinite(rows).all()
-    assert np.abs(rows[:, P] - before).max() < 1.0  # what moves in 1e-12 s
+    assert np.abs(rows["pore_pressure"] - before).max() < 1.0  # what moves in 1e-12 s
 
 
 def test_filter_moves_no_node():
@@ -72,12 +76,15 @@ def test_filter_moves_no_node():
     solver = full_box(pressure_filter=1.0, stress_damping=0.0)
     rng = np.random.default_rng(3)
     rows = solver.points
-    rows[:, P] = 1e5 + 1e4 * rng.standard_normal(solver.n_points)
+    rows["pore_pressure"] = 1e5 + 1e4 * rng.standard_normal(solver.n_points)
     solver.map_points()
-    force, before = solver.nodal_sums()[:, [B_FLX, B_FLY]], rows[:, P].copy()
+    force, before = values(solver.nodal_sums(), ("force_liquid_x", "force_liquid_y")), rows["pore_pressure"].copy()
     solver.step(1e-12)
-    assert np.abs(rows[:, P] - before).max() > 1e3
-    assert np.abs(solver.nodal_sums()[:, [B_FLX, B_FLY]] - force).max() < 1e-8 * np.abs(force).max()
+    assert np.abs(rows["pore_pressure"] - before).max() > 1e3
+    assert (
+        np.abs(values(solver.nodal_sums(), ("force_liquid_x", "force_liquid_y")) - force).max()
+        < 1e-8 * np.abs(force).max()
+    )
 
 
 def test_points_keep_their_water_however_they_are_strained():
@@ -85,13 +92,13 @@ def test_points_keep_their_water_however_they_are_strained():
     solver = full_box(drainage="undrained", pressure_filter=0.0)
     rng = np.random.default_rng(4)
     rows = solver.points
-    rows[:, VSX] = rows[:, VLX] = 30.0 * rng.standard_normal(solver.n_points)
-    rows[:, VSY] = rows[:, VLY] = 30.0 * rng.standard_normal(solver.n_points)
+    rows["velocity_solid_x"] = rows["velocity_liquid_x"] = 30.0 * rng.standard_normal(solver.n_points)
+    rows["velocity_solid_y"] = rows["velocity_liquid_y"] = 30.0 * rng.standard_normal(solver.n_points)
     before, volume = solver._held_water(solver._pore_water()), solver._volumes()
     for _ in range(20):
         solver.step(2e-5)
     assert np.abs(solver._volumes() / volume - 1).max() > 0.01
-    assert rows[:, P].min() < 0.0 < rows[:, P].max()
+    assert rows["pore_pressure"].min() < 0.0 < rows["pore_pressure"].max()
     assert (
         solver.clamps.sum(axis=0)[[list(CLAMPS).index(name) for name in ("porosity_floor", "porosity_ceiling")]].sum()
         == 0
@@ -104,24 +111,24 @@ def test_even_stress_pushes_no_inner_node_however_points_are_shared_among_triang
     """Equilibrium is a matter of the stress alone: points that cross an edge take no force along, nor does the last."""
     solver = full_box(stress_damping=0.0)
     rows = solver.points
-    rows[:, SXX], rows[:, SYY], rows[:, SXY] = -1e5, -2e5, 3e4
+    rows["stress_xx"], rows["stress_yy"], rows["stress_xy"] = -1e5, -2e5, 3e4
     corner = solver.mesh.nodes[solver.mesh.elements[solver.element_of_point]]
     rng = np.random.default_rng(2)
     weight = rng.dirichlet((1.0, 1.0, 1.0), solver.n_points)
-    rows[:, X : Y + 1] = np.einsum("pk,pkd->pd", weight, corner)
+    block(rows, "x", "y")[:] = np.einsum("pk,pkd->pd", weight, corner)
     # of the three in a triangle some go to the next one of its quadrilateral
     given = (solver.element_of_point % 4 == 0) & (np.arange(solver.n_points) % 3 < moved)
     assert given.any()
     solver.element_of_point[given] += 1
-    rows[given, X : Y + 1] = solver.mesh.nodes[solver.mesh.elements[solver.element_of_point[given]]].mean(axis=1)
+    block(rows, "x", "y")[given] = solver.mesh.nodes[solver.mesh.elements[solver.element_of_point[given]]].mean(axis=1)
     solver._sort()
     solver.map_points()
     force = solver.nodal_sums()
     nodes = solver.mesh.nodes
     inner = (np.abs(nodes[:, 0]) < 0.99) & (nodes[:, 1] < -0.01) & (nodes[:, 1] > -0.99)
-    for column in ([B_FX, B_FY], [B_FLX, B_FLY]):
-        size = np.abs(force[~inner][:, column]).max()
-        assert size > 1e3 and np.abs(force[inner][:, column]).max() < 1e-9 * size
+    for names in (("force_x", "force_y"), ("force_liquid_x", "force_liquid_y")):
+        size = np.abs(values(force[~inner], names)).max()
+        assert size > 1e3 and np.abs(values(force[inner], names)).max() < 1e-9 * size
 
 
 @pytest.fixture(scope="module")
@@ -139,7 +146,7 @@ def test_no_material_presses_into_the_lining_beside_the_gate(gushing):
     held = np.bincount(element[element >= 0], gushing._volumes()[element >= 0], len(gushing.mesh.elements))
     # by chance an element holds up to three times what fits; with corners that slip along the channel points pass
     # the edge beside them, are put back and gather there: nine times at 100 kg/m, twenty at 400
-    assert (held / gushing.geometry[:, 6]).max() < 4.0
+    assert (held / gushing.geometry["area"]).max() < 4.0
 
 
 def test_water_of_a_gushing_run_is_what_came_with_the_grains(gushing):

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from coupling.figures import GATE, INITIAL, NOW, RESOLUTION, SECOND, STYLE
 from coupling.figures.utilisations import checks
+from mpm.fields import values
 from structure import BeamSpringLining, CapacityRule, Ground, Limits, Ring, SegmentSection, check, theory
 from structure.capacity import table_3_1
 from structure.joint_laws import contact_moment, limited_shear
@@ -63,7 +64,7 @@ def joint_laws():
         right.legend(loc="upper left")
         for axis in (left, right):
             axis.grid(True, color="0.9")
-            axis.spines[["top", "right"]].set_visible(False)
+            values(axis.spines, ("top", "right")).set_visible(False)
     return figure
 
 

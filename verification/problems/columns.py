@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
+from mpm.fields import values
 from mpm.solver import Solver
-from mpm.variables import MASS, SXX, SYY, SZZ, VLX, VLY, VSX, VSY, X0, Y0, P, Y
 from verification.problems.boxes import box_mesh
 from verification.problems.driven import DrivenSolver, box_scene
 from verification.problems.problem import NUMERICS, WET, Problem, Result, Stopwatch, register
@@ -48,21 +48,21 @@ def terzaghi(
     height, initial = 1.0, 1e4
     scene, mesh = column(cells, height, conductivity, bulk_modulus, drainage=drainage, **numerics)
     solver = Solver(scene, mesh, threads=1)
-    hydrostatic = solver.points[:, P].copy()
-    solver.points[:, P] += initial
-    solver.points[:, SYY] += initial  # total stress unchanged: the load is carried by the water
-    solver.points[:, SXX] += NU / (1 - NU) * initial
-    solver.points[:, SZZ] += NU / (1 - NU) * initial
+    hydrostatic = solver.points["pore_pressure"].copy()
+    solver.points["pore_pressure"] += initial
+    solver.points["stress_yy"] += initial  # total stress unchanged: the load is carried by the water
+    solver.points["stress_xx"] += NU / (1 - NU) * initial
+    solver.points["stress_zz"] += NU / (1 - NU) * initial
     storage = 1 / constrained_modulus() + POROSITY / bulk_modulus
     end = time_factor * height**2 * 1000 * 9.81 * storage / conductivity
     longest = 0.0
     with Stopwatch() as watch:
         while solver.time < end * (1 - 1e-12):
             longest = max(longest, solver.step(end - solver.time)[0])
-    depth = -solver.points[:, Y]
+    depth = -solver.points["y"]
     series = terzaghi_series(depth, time_factor)
     exact = consolidation_with_inertia(depth, end, bulk_modulus, conductivity) if inertia else series
-    miss = (solver.points[:, P] - hydrostatic) / initial - exact
+    miss = (solver.points["pore_pressure"] - hydrostatic) / initial - exact
     return Result(
         error=math.sqrt(np.mean(miss**2)),
         values={
@@ -83,7 +83,7 @@ def oedometer(cells=5, strain=1e-3, duration=0.5, **numerics):
     soil = {"model": "elastic", "poissons_ratio": NU}
     scene = box_scene("oedometer", size, 2 * size, 1.0, soil, gravity=1e-9, **numerics)
     solver = DrivenSolver(scene, box_mesh([-size, 0.0, size], np.linspace(-1, 0, cells + 1)), damping=0.5)
-    solver.points[:, [SXX, SYY, SZZ]] = 0.0
+    solver.points[["stress_xx", "stress_yy", "stress_zz"]] = 0.0
     top = solver.mesh.top
     solver.driven[top, 1] = True
     with Stopwatch() as watch:
@@ -92,7 +92,7 @@ def oedometer(cells=5, strain=1e-3, duration=0.5, **numerics):
             solver.velocity[top, 1] = -2 * strain / duration * math.sin(math.pi * solver.time / duration) ** 2
             solver.step(min(duration - solver.time, duration / 200))
     vertical = constrained_modulus(scene.soils[0].youngs_modulus) * math.log1p(-strain)
-    stress = solver.points[:, [SXX, SYY, SZZ]] / vertical
+    stress = values(solver.points, ("stress_xx", "stress_yy", "stress_zz")) / vertical
     miss = stress - [NU / (1 - NU), 1.0, NU / (1 - NU)]
     return Result(
         error=float(np.sqrt(np.mean(miss**2))),
@@ -146,15 +146,25 @@ def hydrostatics(
     }
     misses = {name: float(np.abs(lining[name] / value - 1).max()) for name, value in exact.items()}
     inside = solver.element_of_point >= 0
-    order = np.lexsort(solver.points[:, X0 : Y0 + 1].T), np.lexsort(before[:, X0 : Y0 + 1].T)
-    change = np.abs(solver.points[order[0]][:, [SXX, SYY, SZZ, P]] - before[order[1]][:, [SXX, SYY, SZZ, P]]).max()
-    speed = np.abs(solver.points[inside][:, [VSX, VSY, VLX, VLY]]).max()
+    order = (
+        np.lexsort(values(solver.points, ("x_initial", "y_initial")).T),
+        np.lexsort(values(before, ("x_initial", "y_initial")).T),
+    )
+    change = np.abs(
+        values(solver.points[order[0]], ("stress_xx", "stress_yy", "stress_zz", "pore_pressure"))
+        - values(before[order[1]], ("stress_xx", "stress_yy", "stress_zz", "pore_pressure"))
+    ).max()
+    speed = np.abs(
+        values(
+            solver.points[inside], ("velocity_solid_x", "velocity_solid_y", "velocity_liquid_x", "velocity_liquid_y")
+        )
+    ).max()
     return Result(
         error=max(misses.values()),
         values={
             **misses, "largest_velocity": float(speed),
-            "change_of_stress": float(change / np.abs(before[:, SYY]).max()),
-            "grains": float(solver.points[:, MASS].sum() / solver.initial_grain_mass - 1),
+            "change_of_stress": float(change / np.abs(before["stress_yy"]).max()),
+            "grains": float(solver.points["grain_mass"].sum() / solver.initial_grain_mass - 1),
         },
         steps=solver.step_count, points=solver.n_points, cpu_seconds=watch.seconds,
     )  # fmt: skip

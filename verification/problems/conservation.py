@@ -3,7 +3,6 @@
 import numpy as np
 
 from mpm.solver import Solver
-from mpm.variables import SXX, SXY, SYY, SZZ, P
 from verification.problems.boxes import box_mesh
 from verification.problems.columns import column
 from verification.problems.problem import NUMERICS, WET, Problem, Result, Stopwatch, register
@@ -25,7 +24,7 @@ def collapse(cells=10, duration=1.0, conductivity=1e-4, **numerics):
         lambda x, y: (x < 0.5) & (y < -0.7),
     )  # fmt: skip
     solver = Solver(scene, mesh, threads=1)
-    solver.points[:, [SXX, SYY, SZZ, SXY, P]] = 0.0
+    solver.points[["stress_xx", "stress_yy", "stress_zz", "stress_xy", "pore_pressure"]] = 0.0
     solver.initial = solver.sums_over_points()
     monitor = Monitor(solver)
     with Stopwatch() as watch:

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from mpm.contact import FIXED_X, FIXED_Y
-from mpm.long_step import ADVANCE, FOLLOW, PLAN, REMAP, SOLVE, UPDATE
+from mpm.fields import block, values
 from mpm.scene import Scene
 from mpm.solver import Solver
-from mpm.variables import B_D, V_DLX, V_DLY, V_DSX, V_DSY, V_LX, V_LY, V_ML, V_MS, V_SX, V_SY
+from mpm.step.substep import ADVANCE, FOLLOW, PLAN, REMAP, SOLVE, UPDATE
+from mpm.walls.contact import FIXED_X, FIXED_Y
 
 
 class DrivenSolver(Solver):
@@ -43,16 +43,18 @@ class DrivenSolver(Solver):
         self._run(PLAN, SOLVE, batch)
         self._drive(float(self.clock.dt_of_level[0]))
         self._run(ADVANCE, REMAP)
-        moved = self.driven & (self.nodes[:, V_MS] > 0)[:, None]
-        self.nodes[:, V_SX : V_SY + 1][moved] = self.velocity[moved]
-        self.nodes[:, V_LX : V_LY + 1][self.driven_liquid] = self.velocity_liquid[self.driven_liquid]
+        moved = self.driven & (self.nodes["mass_solid"] > 0)[:, None]
+        block(self.nodes, "velocity_solid_x", "velocity_solid_y")[moved] = self.velocity[moved]
+        block(self.nodes, "velocity_liquid_x", "velocity_liquid_y")[self.driven_liquid] = self.velocity_liquid[
+            self.driven_liquid
+        ]
         self._run(UPDATE, FOLLOW)
 
     def _drive(self, dt):
         row = self.nodes
-        mass = row[:, V_MS : V_MS + 1]
+        mass = row["mass_solid"][:, None]
         full = mass > 0
-        velocity, change = row[:, V_SX : V_SY + 1], row[:, V_DSX : V_DSY + 1]
+        velocity, change = (block(row, f"{name}_solid_x", f"{name}_solid_y") for name in ("velocity", "change"))
         free = (np.column_stack([self.fixed & FIXED_X, self.fixed & FIXED_Y]) == 0) & full
         push = np.where(free, dt * self.force / np.where(full, mass, 1.0), 0.0)
         velocity += push
@@ -67,14 +69,14 @@ class DrivenSolver(Solver):
         velocity += jump
         change += jump
         if self.scene.is_two_phase and jump.any():  # drag is implicit: grains that are driven take the water along
-            drag = dt * self.nodal_sums()[:, B_D : B_D + 1]
-            jump *= drag / np.where(full, row[:, V_ML : V_ML + 1] + drag, 1.0)
-            row[:, V_LX : V_LY + 1] += jump
-            row[:, V_DLX : V_DLY + 1] += jump
+            drag = dt * self.nodal_sums()["drag"][:, None]
+            jump *= drag / np.where(full, row["mass_liquid"][:, None] + drag, 1.0)
+            block(row, "velocity_liquid_x", "velocity_liquid_y")[:] += jump
+            block(row, "change_liquid_x", "change_liquid_y")[:] += jump
         moved = self.driven_liquid & full
-        jump = np.where(moved, self.velocity_liquid - row[:, V_LX : V_LY + 1], 0.0)
-        row[:, V_LX : V_LY + 1] += jump
-        row[:, V_DLX : V_DLY + 1] += jump
+        jump = np.where(moved, self.velocity_liquid - values(row, ("velocity_liquid_x", "velocity_liquid_y")), 0.0)
+        block(row, "velocity_liquid_x", "velocity_liquid_y")[:] += jump
+        block(row, "change_liquid_x", "change_liquid_y")[:] += jump
 
 
 def box_scene(name, size, width, depth, soil, water=None, gravity=9.81, points=3, **numerics):

@@ -7,8 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from mpm.contact import FIXED_X, FIXED_Y
-from mpm.variables import MASS, SXX, SYY, SZZ, Y0, P, Y
+from mpm.walls.contact import FIXED_X, FIXED_Y
 from verification.problems.boxes import box_mesh
 from verification.problems.driven import DrivenSolver, box_scene
 from verification.problems.problem import NUMERICS, WET, Problem, Result, Stopwatch, register
@@ -58,7 +57,7 @@ def wall(
     phi, psi = np.radians([friction_angle, dilatancy_angle])
     slip = np.arctan(np.sin(phi) * np.cos(psi) / (1 - np.sin(psi) * np.sin(phi)))
     coefficient, localised = (np.tan(np.pi / 4 + direction * angle / 2) ** 2 for angle in (phi, slip))
-    geostatic = 0.5 * solver.scene.gravity * solver.points[:, MASS].sum() / (columns * size)
+    geostatic = 0.5 * solver.scene.gravity * solver.points["grain_mass"].sum() / (columns * size)
     exact = coefficient * geostatic + direction * 2 * cohesion * np.sqrt(coefficient)
     softened = localised * geostatic + direction * 2 * cohesion * np.tan(slip) / np.tan(phi) * np.sqrt(localised)
     beyond = max(load - max(exact, softened), min(exact, softened) - load, 0.0)
@@ -98,8 +97,8 @@ def footing_solver(cells, friction_angle, stiffness, bulk_modulus, damping, **nu
     water = None if bulk_modulus is None else {"bulk_modulus": bulk_modulus, "drainage": "undrained"}
     solver = DrivenSolver(box_scene("footing", size, width, depth, soil, water, gravity=0.0, **numerics), mesh, damping)
     if water is not None:
-        solver.points[:, P] = 20 * cohesion
-        solver.points[:, [SXX, SYY, SZZ]] = 20 * cohesion
+        solver.points["pore_pressure"] = 20 * cohesion
+        solver.points[["stress_xx", "stress_yy", "stress_zz"]] = 20 * cohesion
     under = np.flatnonzero((np.abs(mesh.nodes[:, 1]) < 1e-9) & (mesh.nodes[:, 0] < 1 + 1e-9))
     return solver, under, spiral
 
@@ -141,14 +140,14 @@ def loaded_footing(
     """
     solver, under, _ = footing_solver(cells, 0.0, stiffness, bulk_modulus, damping, **numerics)
     length = np.where(np.abs(solver.mesh.nodes[under, 0] - 0.5) > 0.5 - 1e-9, 0.5, 1.0) / cells  # of a pressure on 1 m
-    top = solver.points[:, Y] > -1.0 / cells
+    top = solver.points["y"] > -1.0 / cells
     settled, times = [], []
     with Stopwatch() as watch:
         while solver.time < duration:
             ramp = min(1.0, 5 * solver.time / duration)
             solver.force[under, 1] = -ramp * share * (2 + np.pi) * COHESION * length
             solver.step(duration - solver.time)
-            settled.append(float(np.abs(solver.points[top, Y0] - solver.points[top, Y]).max()))
+            settled.append(float(np.abs(solver.points["y_initial"][top] - solver.points["y"][top]).max()))
             times.append(solver.time)
     settled, times = np.array(settled), np.array(times)
     first, last = (settled[(times > a * duration) & (times <= (a + 0.1) * duration)].mean() for a in (0.5, 0.9))

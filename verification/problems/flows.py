@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from mpm.contact import FIXED_Y
+from mpm.fields import values
 from mpm.solver import Solver
-from mpm.variables import MASS, SXX, SXY, SYY, SZZ, VSX, VSY, N, X, Y
+from mpm.walls.contact import FIXED_Y
 from verification.problems.boxes import box_mesh
 from verification.problems.driven import box_scene
 from verification.problems.problem import NUMERICS, WET, Problem, Result, Stopwatch, register
@@ -28,12 +28,12 @@ def patches(solver):
     inside = solver.element_of_point >= 0
     element = solver.element_of_point[inside]
     g, point = geometry[element], solver.points[inside]
-    dx, dy = point[:, X] - g[:, 4], point[:, Y] - g[:, 5]
-    n1, n2 = g[:, 0] * dx + g[:, 1] * dy, g[:, 2] * dx + g[:, 3] * dy
+    dx, dy = point["x"] - g["x"], point["y"] - g["y"]
+    n1, n2 = g["dn1_dx"] * dx + g["dn1_dy"] * dy, g["dn2_dx"] * dx + g["dn2_dy"] * dy
     share = np.column_stack([1 - n1 - n2, n1, n2]) * solver.points_by_name()["volume"][inside, None]
     count = len(mesh.nodes)
     volume = np.bincount(mesh.elements[element].ravel(), share.ravel(), count)
-    area = np.bincount(mesh.elements.ravel(), np.repeat(geometry[:, 6] / 3, 3), count)
+    area = np.bincount(mesh.elements.ravel(), np.repeat(geometry["area"] / 3, 3), count)
     return area, volume, np.minimum(volume, area)
 
 
@@ -97,10 +97,15 @@ def column_collapse(
     with Stopwatch() as watch:
         while solver.time < end:
             solver.step(end - solver.time)
-    run_out = front(solver.points[:, X], size) - 1
+    run_out = front(solver.points["x"], size) - 1
     depth = depth_profile(solver, x)
     height = float(depth[0])
-    speed = np.sqrt(np.average(np.sum(solver.points[:, VSX : VSY + 1] ** 2, axis=1), weights=solver.points[:, MASS]))
+    speed = np.sqrt(
+        np.average(
+            np.sum(values(solver.points, ("velocity_solid_x", "velocity_solid_y")) ** 2, axis=1),
+            weights=solver.points["grain_mass"],
+        )
+    )
     return Result(
         error=float(max(abs(run_out / lube_run_out(aspect) - 1), abs(height / lube_height(aspect) - 1))),
         values={
@@ -125,10 +130,10 @@ def water(name, mesh, size, width, depth, modulus=1e6, **numerics):
     }  # fmt: skip
     scene = box_scene(name, size, width, depth, soil, {"bulk_modulus": modulus}, **numerics)
     solver = Solver(scene, mesh, threads=1)
-    solver.points[:, MASS] *= (1 - porosity) / (1 - solver.points[:, N])
-    solver.points[:, N] = porosity
-    solver.points[:, [SXX, SYY, SZZ, SXY]] = 0.0
-    solver.initial_grain_mass = float(solver.points[:, MASS].sum())
+    solver.points["grain_mass"] *= (1 - porosity) / (1 - solver.points["porosity"])
+    solver.points["porosity"] = porosity
+    solver.points[["stress_xx", "stress_yy", "stress_zz", "stress_xy"]] = 0.0
+    solver.initial_grain_mass = float(solver.points["grain_mass"].sum())
     floor = np.abs(mesh.nodes[:, 1] - mesh.nodes[:, 1].min()) < 1e-9
     solver.fixed[floor] |= FIXED_Y
     return solver
@@ -158,7 +163,7 @@ def dam_break(cells=10, times=4.0, **numerics):
     depth = depth_profile(solver, edges)
     exact = ritter_depth(edges, end, 1.0, gravity)
     wave = np.abs(edges) < 2 * times
-    tip = front(solver.points[:, X], size)
+    tip = front(solver.points["x"], size)
     return Result(
         error=float(np.abs(depth - exact)[wave].sum() / exact[wave & (edges > -times)].sum()),
         values={
@@ -190,7 +195,7 @@ def water_column(cells=10, **numerics):
             end = time / np.sqrt(2 * gravity)
             while solver.time < end:
                 solver.step(end - solver.time)
-            fronts.append(front(solver.points[:, X], size))
+            fronts.append(front(solver.points["x"], size))
     error = np.abs(np.array(fronts) - MARTIN_MOYCE[:, 1]) / (MARTIN_MOYCE[-1, 1] - 1)
     return Result(
         error=float(error.mean()), values={"last_front": fronts[-1], "overlap": overlap(solver)},

@@ -4,8 +4,12 @@ import math
 
 import numpy as np
 
+from mpm.fields import (
+    CONTACT_RECORD,
+    REACTION_RECORD,
+    values,
+)
 from mpm.solver import Solver
-from mpm.variables import MASS, SXX, SXY, SYY, SZZ, VLX, VLY, VSX, VSY, X0, Y0, P, X, Y
 from verification.problems.boxes import box_mesh
 from verification.problems.columns import column
 from verification.problems.driven import DrivenSolver, box_scene
@@ -22,15 +26,17 @@ def free_fall(cells=10, duration=0.5, **numerics):
     x, y = np.arange(-cells, 4 * cells + 1) * size, np.arange(-3 * cells, 3 * cells + 1) * size
     mesh = box_mesh(x, y, lambda x, y: (np.abs(x) < 0.3) & (np.abs(y + 0.5) < 0.3))
     solver = Solver(scene, mesh, threads=1)
-    solver.points[:, [SXX, SYY, SZZ, SXY, P]] = 0.0
+    solver.points[["stress_xx", "stress_yy", "stress_zz", "stress_xy", "pore_pressure"]] = 0.0
     thrown = np.array([3.0, 4.0])
-    solver.points[:, [VSX, VSY]] = solver.points[:, [VLX, VLY]] = thrown
+    solver.points[["velocity_solid_x", "velocity_solid_y"]] = solver.points[
+        ["velocity_liquid_x", "velocity_liquid_y"]
+    ] = thrown
     with Stopwatch() as watch:
         while solver.time < duration * (1 - 1e-12):
             solver.step(duration - solver.time)
     way = thrown * duration - [0.0, 0.5 * scene.gravity * duration**2]
-    miss = solver.points[:, [X, Y]] - solver.points[:, [X0, Y0]] - way
-    stress = np.abs(solver.points[:, [SXX, SYY, SZZ, SXY, P]]).max()
+    miss = values(solver.points, ("x", "y")) - values(solver.points, ("x_initial", "y_initial")) - way
+    stress = np.abs(values(solver.points, ("stress_xx", "stress_yy", "stress_zz", "stress_xy", "pore_pressure"))).max()
     weight = scene.gravity * (solver.initial_grain_mass + solver.initial["water"]) / 0.6
     return Result(
         error=float(np.abs(miss).max() / np.linalg.norm(way)),
@@ -60,23 +66,33 @@ def sliding_block(cells=5, slope=30.0, friction=0.2, duration=0.5, **numerics):
     solver = Solver(scene, mesh, threads=1)
     solver.contact_of_node[floor] = np.arange(len(floor), dtype=np.int32)
     solver.n_contact = len(floor)
-    solver.normal, solver.active = np.tile(normal, (len(floor), 1)), np.ones(len(floor), np.int8)
-    solver.friction, solver.impulse = np.full(len(floor), friction), np.zeros((len(floor), 5))
+    solver.contact, solver.impulse = np.zeros(len(floor), CONTACT_RECORD), np.zeros(len(floor), REACTION_RECORD)
+    solver.wall = np.zeros((len(floor), 2))
+    solver.contact["normal_x"], solver.contact["normal_y"] = normal
+    solver.contact["active"], solver.contact["friction"] = 1.0, friction
     density = (1 - scene.soils[0].porosity) * scene.soils[0].grain_density
-    above = height - (solver.points[:, [X, Y]] @ normal + 3.0)
+    above = height - (values(solver.points, ("x", "y")) @ normal + 3.0)
     pressure = density * gravity * math.cos(angle) * above
     # stress -p n n - tau (n s + s n) with tau = mu p: the floor drags the block back along s
-    for column_, i, j in ((SXX, 0, 0), (SYY, 1, 1), (SXY, 0, 1)):
-        solver.points[:, column_] = -pressure * normal[i] * normal[j] - friction * pressure * (
+    for column_, i, j in (("stress_xx", 0, 0), ("stress_yy", 1, 1), ("stress_xy", 0, 1)):
+        solver.points[column_] = -pressure * normal[i] * normal[j] - friction * pressure * (
             -normal[i] * along[j] - along[i] * normal[j]
         )
-    solver.points[:, SZZ] = 0.0
+    solver.points["stress_zz"] = 0.0
     with Stopwatch() as watch:
         while solver.time < duration * (1 - 1e-12):
             solver.step(duration - solver.time)
-    mass = solver.points[:, MASS]
-    moved = float(mass @ ((solver.points[:, [X, Y]] - solver.points[:, [X0, Y0]]) @ along) / mass.sum())
-    lifted = float(mass @ ((solver.points[:, [X, Y]] - solver.points[:, [X0, Y0]]) @ normal) / mass.sum())
+    mass = solver.points["grain_mass"]
+    moved = float(
+        mass
+        @ ((values(solver.points, ("x", "y")) - values(solver.points, ("x_initial", "y_initial"))) @ along)
+        / mass.sum()
+    )
+    lifted = float(
+        mass
+        @ ((values(solver.points, ("x", "y")) - values(solver.points, ("x_initial", "y_initial"))) @ normal)
+        / mass.sum()
+    )
     way = 0.5 * gravity * (math.sin(angle) - friction * math.cos(angle)) * duration**2
     return Result(
         error=abs(moved / way - 1), values={"way": moved, "lifted": lifted},
@@ -96,19 +112,27 @@ def rotation(cells=10, turn=90.0, steps=400, **numerics):
     mesh.left = mesh.right = np.zeros(0, np.int32)
     solver = DrivenSolver(scene, mesh)
     stress = np.array([[-3e3, 1e3], [1e3, -1e3]])
-    solver.points[:, SXX], solver.points[:, SYY] = stress[0, 0], stress[1, 1]
-    solver.points[:, SXY], solver.points[:, SZZ] = stress[0, 1], -2e3
+    solver.points["stress_xx"], solver.points["stress_yy"] = stress[0, 0], stress[1, 1]
+    solver.points["stress_xy"], solver.points["stress_zz"] = stress[0, 1], -2e3
     total, dt = math.radians(turn), 0.25 * solver.time_step_estimate()[0]
     rate = total / (steps * dt)
     solver.driven[:] = True
     solver.velocity[:] = rate * np.column_stack([-mesh.nodes[:, 1], mesh.nodes[:, 0]])
-    solver.points[:, VSX], solver.points[:, VSY] = -rate * solver.points[:, Y], rate * solver.points[:, X]
+    solver.points["velocity_solid_x"], solver.points["velocity_solid_y"] = (
+        -rate * solver.points["y"],
+        rate * solver.points["x"],
+    )
     with Stopwatch() as watch:
         for _ in range(steps):
             solver.step(dt)
     turned = np.array([[math.cos(total), -math.sin(total)], [math.sin(total), math.cos(total)]])
     exact = turned @ stress @ turned.T
-    miss = solver.points[:, [SXX, SYY, SXY, SZZ]] - [exact[0, 0], exact[1, 1], exact[0, 1], -2e3]
+    miss = values(solver.points, ("stress_xx", "stress_yy", "stress_xy", "stress_zz")) - [
+        exact[0, 0],
+        exact[1, 1],
+        exact[0, 1],
+        -2e3,
+    ]
     return Result(
         error=float(np.abs(miss).max() / np.abs(np.linalg.eigvalsh(stress)).max()),
         values={"angle": math.degrees(rate * solver.time)},

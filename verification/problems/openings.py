@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from mpm.contact import FIXED_X, FIXED_Y
 from mpm.solver import Solver
-from mpm.variables import MASS, S_DRAG, SXX, SXY, SYY, SZZ, P, X, Y
+from mpm.walls.contact import FIXED_X, FIXED_Y
 from verification.problems.boxes import annulus_mesh, box_mesh
 from verification.problems.driven import DrivenSolver, box_scene
 from verification.problems.earth_pressure import load_path
@@ -56,7 +55,7 @@ def cavity(
         "friction_angle": friction_angle, "dilatancy_angle": dilatancy_angle, "k0": 1.0,
     }  # fmt: skip
     solver = DrivenSolver(box_scene("cavity", 1.0, 2 * outer, outer, soil, gravity=0.0, **numerics), mesh, damping)
-    solver.points[:, [SXX, SYY, SZZ]] = -initial
+    solver.points[["stress_xx", "stress_yy", "stress_zz"]] = -initial
     solver.fixed[mesh.on_axis] |= FIXED_Y
     solver.fixed[mesh.outer] |= FIXED_X | FIXED_Y
     wall, outward = mesh.inner, mesh.nodes[mesh.inner]
@@ -105,8 +104,8 @@ def seepage(sectors=10, outer=6.0, conductivity=0.05, duration=1.2, **numerics):
     water = {"density": density, "bulk_modulus": 1e7}
     scene = box_scene("seepage", 1.0, 2 * outer, outer + 1, soil, water, gravity=0.0, **numerics)
     solver = DrivenSolver(scene, mesh)
-    solver.soils[:, S_DRAG] = gravity / conductivity  # the weightless scene has none
-    solver.points[:, [SXX, SYY, SZZ, SXY, P]] = 0.0
+    solver.soils["drag"] = gravity / conductivity  # the weightless scene has none
+    solver.points[["stress_xx", "stress_yy", "stress_zz", "stress_xy", "pore_pressure"]] = 0.0
     solver.fixed[mesh.on_axis] |= FIXED_Y
     solver.fixed[mesh.outer] |= FIXED_X | FIXED_Y
     flux = conductivity / (density * gravity) * high / np.log(outer) / outer
@@ -118,13 +117,13 @@ def seepage(sectors=10, outer=6.0, conductivity=0.05, duration=1.2, **numerics):
             ramp = min(1.0, 5 * solver.time / end)
             solver.velocity_liquid[mesh.outer] = -ramp * flux / porosity * rim / np.linalg.norm(rim, axis=1)[:, None]
             solver.step(end - solver.time)
-    radius = np.hypot(solver.points[:, X], solver.points[:, Y])
+    radius = np.hypot(solver.points["x"], solver.points["y"])
     exact = high * np.log(radius) / np.log(outer)
-    miss = solver.points[:, P] - exact
+    miss = solver.points["pore_pressure"] - exact
     return Result(
-        error=float(np.sqrt(np.average(miss**2, weights=solver.points[:, MASS])) / high),
+        error=float(np.sqrt(np.average(miss**2, weights=solver.points["grain_mass"])) / high),
         values={
-            "outer_pressure": float(solver.points[radius > 0.95 * outer, P].mean() / high),
+            "outer_pressure": float(solver.points["pore_pressure"][radius > 0.95 * outer].mean() / high),
             "largest": float(np.abs(miss).max() / high),
         },
         steps=solver.step_count, points=solver.n_points, cpu_seconds=watch.seconds,
@@ -149,7 +148,7 @@ def trapdoor(
     half_width = 1 + size / 2
     friction = 2 * np.sin(np.radians(friction_angle)) * cover / (2 * half_width)
     exact = (1 - np.exp(-friction)) / friction
-    ratio = load / (half_width * solver.scene.gravity * solver.points[:, MASS].sum() / 4.0)
+    ratio = load / (half_width * solver.scene.gravity * solver.points["grain_mass"].sum() / 4.0)
     return Result(
         error=float(abs(ratio / exact - 1)),
         values={"load_over_weight": float(ratio), "exact": float(exact), "trend": float(trend)},
@@ -186,7 +185,7 @@ def slot(
         for end in times:
             while solver.time < end:
                 solver.step(end - solver.time)
-            out.append(2 * solver.points[solver.points[:, Y] < -height, MASS].sum())
+            out.append(2 * solver.points["grain_mass"][solver.points["y"] < -height].sum())
     rate = np.diff(out) / np.diff(times) / (0.6 * 2650.0 * np.sqrt(gravity))
     return Result(
         error=float(abs(rate.mean() / 1.03 - 1)),

@@ -29,19 +29,22 @@ class Element:
         self.elastic = stiffness(E, NU)
         shear = E / (2 * (1 + NU))
         apex = cohesion / np.tan(phi) if phi > 0 else np.inf
-        self.parameters = (
-            shear, E / (3 * (1 - 2 * NU)), cohesion * np.cos(phi), np.sin(phi), np.sin(psi), apex,
-            min(tensile_strength, apex), *relaxation,
-        )  # fmt: skip
+        strength = cohesion * np.cos(phi), np.sin(phi), np.sin(psi), apex, min(tensile_strength, apex)
+        keep = relaxation[0] / sum(relaxation)
+        self.parameters = shear, E / (3 * (1 - 2 * NU)), strength, keep
         self.turn = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
 
     def advance(self, stress, strain):
         """Principal stresses (xx, yy, zz) [Pa] after a strain increment (xx, yy, zz) [-] in principal axes."""
-        from mpm.materials.mohr_coulomb import mohr_coulomb
+        from mpm.laws.mohr_coulomb import Strength, return_to_surface
+        from mpm.laws.stress import Stress
 
         trial = stress + self.elastic @ strain
         plane = self.turn @ np.diag(trial[:2]) @ self.turn.T
-        xx, yy, zz, xy, _ = mohr_coulomb(plane[0, 0], plane[1, 1], trial[2], plane[0, 1], *self.parameters)
+        shear, bulk, strength, keep = self.parameters
+        (xx, yy, zz, xy), _ = return_to_surface(
+            Stress(plane[0, 0], plane[1, 1], trial[2], plane[0, 1]), shear, bulk, Strength(*strength), keep
+        )
         plane = self.turn.T @ np.array([[xx, xy], [xy, yy]]) @ self.turn
         return np.array([plane[0, 0], plane[1, 1], zz])
 

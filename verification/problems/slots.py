@@ -4,8 +4,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import j0, j1, y0, y1
 
-from mpm.contact import FIXED_X, FIXED_Y
-from mpm.variables import MASS, S_DRAG, SXX, SXY, SYY, SZZ, P, X, Y
+from mpm.walls.contact import FIXED_X, FIXED_Y
 from verification.problems.boxes import annulus_mesh, box_mesh
 from verification.problems.driven import DrivenSolver, box_scene
 from verification.problems.flows import overlap, water
@@ -17,10 +16,10 @@ KIRCHHOFF = np.pi / (np.pi + 2)  # width of a free jet far from a slot in a flat
 
 def water_level(solver, size, width, top):
     """Median height of the highest point of each column of elements."""
-    inside = (solver.points[:, Y] > -top) & (solver.points[:, X] < width)
-    column = np.floor(solver.points[inside, X] / size).astype(int)
+    inside = (solver.points["y"] > -top) & (solver.points["x"] < width)
+    column = np.floor(solver.points["x"][inside] / size).astype(int)
     highest = np.full(round(width / size), -top)
-    np.maximum.at(highest, column, solver.points[inside, Y])
+    np.maximum.at(highest, column, solver.points["y"][inside])
     return float(np.median(highest))
 
 
@@ -40,7 +39,7 @@ def tank(cells=8, head=3.0, width=3.0, emptied=0.2, **numerics):
     floor = (np.abs(mesh.nodes[:, 1] + head) < 1e-9) & (mesh.nodes[:, 0] > slot - 1e-9)
     solver.fixed[floor] |= FIXED_Y
     solver.fixed[np.abs(mesh.nodes[:, 1] - mesh.nodes[:, 1].min()) < 1e-9] = 0
-    level0, whole = water_level(solver, size, width, head), solver.points[:, MASS].sum()
+    level0, whole = water_level(solver, size, width, head), solver.points["grain_mass"].sum()
     times, out, levels = [0.0], [0.0], [0.0]
     with Stopwatch() as watch:
         while out[-1] < emptied * head * width:
@@ -48,7 +47,7 @@ def tank(cells=8, head=3.0, width=3.0, emptied=0.2, **numerics):
             while solver.time < end * (1 - 1e-12):
                 solver.step(end - solver.time)
             times.append(solver.time)
-            out.append(float(solver.points[solver.points[:, Y] < -head, MASS].sum() / whole) * head * width)
+            out.append(float(solver.points["grain_mass"][solver.points["y"] < -head].sum() / whole) * head * width)
             levels.append(level0 - water_level(solver, size, width, head))
     times, out, levels = map(np.array, (times, out, levels))
     late = out > 0.4 * out[-1]
@@ -107,15 +106,15 @@ def well(sectors=10, outer=4.0, conductivity=1e-3, stages=(0.1, 0.5, 2.0), **num
     water_ = {"density": density, "bulk_modulus": modulus}
     scene = box_scene("well", 1.0, 2 * outer, outer + 1, soil, water_, gravity=0.0, **numerics)
     solver = DrivenSolver(scene, mesh)
-    solver.soils[:, S_DRAG] = gravity / conductivity  # the weightless scene has none
-    solver.points[:, [SXX, SYY, SZZ, SXY]] = 0.0
-    solver.points[:, P] = initial
+    solver.soils["drag"] = gravity / conductivity  # the weightless scene has none
+    solver.points[["stress_xx", "stress_yy", "stress_zz", "stress_xy"]] = 0.0
+    solver.points["pore_pressure"] = initial
     solver.driven[:] = True
     solver.fixed[mesh.on_axis] |= FIXED_Y
     solver.fixed[mesh.outer] |= FIXED_X | FIXED_Y
     solver.driven_liquid[mesh.outer] = True
     diffusivity = conductivity * modulus / (density * gravity * porosity)
-    radius = np.hypot(solver.points[:, X], solver.points[:, Y])
+    radius = np.hypot(solver.points["x"], solver.points["y"])
     table = np.linspace(1, outer, 400)
     exact = drained_well(table, stages, outer)
     errors, drained = [], []
@@ -124,12 +123,14 @@ def well(sectors=10, outer=4.0, conductivity=1e-3, stages=(0.1, 0.5, 2.0), **num
             end = stage / diffusivity
             while solver.time < end * (1 - 1e-12):
                 solver.step(end - solver.time)
-            radius = np.hypot(solver.points[:, X], solver.points[:, Y])
-            weight = solver.points[:, MASS]
-            miss = solver.points[:, P] / initial - np.interp(radius, table, profile)
+            radius = np.hypot(solver.points["x"], solver.points["y"])
+            weight = solver.points["grain_mass"]
+            miss = solver.points["pore_pressure"] / initial - np.interp(radius, table, profile)
             errors.append(float(np.sqrt(np.average(miss**2, weights=weight))))
             left = np.trapezoid(profile * table, table) / (0.5 * (outer**2 - 1))
-            drained.append(float((1 - np.average(solver.points[:, P], weights=weight) / initial) / (1 - left) - 1))
+            drained.append(
+                float((1 - np.average(solver.points["pore_pressure"], weights=weight) / initial) / (1 - left) - 1)
+            )
     return Result(
         error=max(errors),
         values={"early": errors[0], "late": errors[-1], "outflow_early": drained[0], "outflow_late": drained[-1]},

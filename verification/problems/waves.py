@@ -5,7 +5,6 @@ import math
 import numpy as np
 
 from mpm.solver import Solver
-from mpm.variables import SXX, SYY, SZZ, VLY, VSY, P, Y
 from verification.problems.boxes import box_mesh
 from verification.problems.columns import DRAINAGE, column
 from verification.problems.driven import box_scene
@@ -28,23 +27,26 @@ def two_phase_wave(
     scene, mesh = column(cells, HEIGHT, conductivity, bulk_modulus, YOUNG, drainage=drainage, **numerics)
     solver = Solver(scene, mesh, threads=1)
     kappa = math.pi / (2 * HEIGHT)
-    strain = np.cos(kappa * (solver.points[:, Y] + HEIGHT))
+    strain = np.cos(kappa * (solver.points["y"] + HEIGHT))
     # water is as stiff as K_w + p: the mean of p where the wave strains it
-    bulk_modulus += float((strain**2 @ solver.points[:, P]) / (strain @ strain))
+    bulk_modulus += float((strain**2 @ solver.points["pore_pressure"]) / (strain @ strain))
     speeds, shapes = modes(bulk_modulus)
     shape = np.ones(2) if mode == "together" else shapes[1 if mode == "fast" else 0]
     amplitude = 1e-5 * shape / np.abs(shape).max()
-    wave = np.sin(kappa * (solver.points[:, Y] + HEIGHT))
-    solver.points[:, VSY], solver.points[:, VLY] = amplitude[0] * wave, amplitude[1] * wave
+    wave = np.sin(kappa * (solver.points["y"] + HEIGHT))
+    solver.points["velocity_solid_y"], solver.points["velocity_liquid_y"] = amplitude[0] * wave, amplitude[1] * wave
     end = periods * 2 * math.pi / kappa / speeds[0 if mode == "slow" else 1]
     times, measured = [], []
     with Stopwatch() as watch:
         while solver.time < end * (1 - 1e-12):
             dt, _ = solver.step(end - solver.time)
-            wave = np.sin(kappa * (solver.points[:, Y] + HEIGHT))
+            wave = np.sin(kappa * (solver.points["y"] + HEIGHT))
             times.append(solver.time - 0.5 * dt)  # velocities belong to the middle of a step
             measured.append(
-                [wave @ solver.points[:, VSY] / (wave @ wave), wave @ solver.points[:, VLY] / (wave @ wave)]
+                [
+                    wave @ solver.points["velocity_solid_y"] / (wave @ wave),
+                    wave @ solver.points["velocity_liquid_y"] / (wave @ wave),
+                ]
             )
     exact = exact_velocities(amplitude, kappa, times, bulk_modulus, conductivity)
     miss = (np.array(measured) - exact) / np.abs(amplitude).max()
@@ -76,21 +78,21 @@ def bar(cells=20, periods=5.0, **numerics):
     soil = {"model": "elastic", "poissons_ratio": 0.0}
     scene = box_scene("bar", size, 2 * size, length, soil, gravity=1e-9, **numerics)
     solver = Solver(scene, box_mesh([-size, 0.0, size], np.linspace(-1, 0, cells + 1)), threads=1)
-    solver.points[:, [SXX, SYY, SZZ, P]] = 0.0
+    solver.points[["stress_xx", "stress_yy", "stress_zz", "pore_pressure"]] = 0.0
     soil = scene.soils[0]
     speed = math.sqrt(soil.youngs_modulus / ((1 - soil.porosity) * soil.grain_density))
     omega, amplitude = math.pi * speed / (2 * length), 1e-4 * speed
-    shape = np.sin(math.pi / 2 * (solver.points[:, Y] + length))
-    solver.points[:, VSY] = amplitude * shape
+    shape = np.sin(math.pi / 2 * (solver.points["y"] + length))
+    solver.points["velocity_solid_y"] = amplitude * shape
     begin = kinetic_energy(solver) + strain_energy(solver)
     end, times, swing, energy = periods * 2 * math.pi / omega, [], [], []
     with Stopwatch() as watch:
         while solver.time < end * (1 - 1e-12):
             before = strain_energy(solver)
             dt, _ = solver.step(end - solver.time)
-            shape = np.sin(math.pi / 2 * (solver.points[:, Y] + length))
+            shape = np.sin(math.pi / 2 * (solver.points["y"] + length))
             times.append(solver.time - 0.5 * dt)
-            swing.append(shape @ solver.points[:, VSY] / (shape @ shape) / amplitude)
+            swing.append(shape @ solver.points["velocity_solid_y"] / (shape @ shape) / amplitude)
             energy.append((kinetic_energy(solver) + 0.5 * (before + strain_energy(solver))) / begin - 1)
     times = np.array(times)
     decay = 0.5 * omega**2 * scene.numerics.stress_damping * end / solver.step_count

@@ -20,7 +20,7 @@ ELEMENT_PASSES = 2
 def bytes_per_point_step(solver):
     """Bytes read and written per point and step [B] by points, elements and nodes: dict."""
     points, mesh = solver.n_points, solver.mesh
-    row = solver.points.itemsize * solver.points.shape[1]
+    row = solver.points.itemsize
     of_points = PASSES * (2 * row + solver.order.itemsize + solver.soil_of_point.itemsize)
     record = solver.geometry[0].nbytes + mesh.elements[0].nbytes + solver.occupied.itemsize + solver.start.itemsize
     # contents are written by one pass, and read by both

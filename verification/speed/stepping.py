@@ -5,7 +5,7 @@ import time as clock
 
 import numpy as np
 
-from mpm.long_step import PASSES
+from mpm.step.substep import PASSES
 
 SECONDS_OF_WARM_UP = 0.5
 

@@ -14,31 +14,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mpm.long_step import ADVANCE, FOLLOW, PLAN, REMAP, SOLVE
+from mpm.fields import (
+    block,
+    numbers,
+    values,
+)
+from mpm.pace.spectrum import Spectrum, spectral_time_step
 from mpm.scene import Numerics, Scene
 from mpm.solver import Solver
-from mpm.spectrum import Spectrum, spectral_time_step
-from mpm.variables import (
-    B_ML,
-    B_MN,
-    B_MS,
-    B_PLX,
-    B_PLY,
-    B_PSX,
-    B_PSY,
-    SXX,
-    SXY,
-    SYY,
-    V_ML,
-    V_MS,
-    VLX,
-    VLY,
-    VSX,
-    VSY,
-    P,
-    X,
-    Y,
-)
+from mpm.step.substep import ADVANCE, FOLLOW, PLAN, REMAP, SOLVE
 from verification.problems.boxes import box_mesh
 
 DEFAULT = Numerics()
@@ -147,11 +131,11 @@ class SteppedAt(Solver):
     def step_of(self, dt):
         """Advance by dt [s], whatever the critical time step: from where points have moved to where they have again."""
         self.map_points()
-        self.momenta[:] = self.sums[:, :, [B_PSX, B_PSY, B_PLX, B_PLY]]
+        numbers(self.momenta)[:] = block(self.sums, "momentum_solid_x", "momentum_liquid_y")
         held = self.nodal_sums()
-        self.nodes[:, V_MS], self.nodes[:, V_ML] = held[:, B_MS], held[:, B_ML]
+        self.nodes["mass_solid"], self.nodes["mass_liquid"] = held["mass_solid"], held["mass_liquid"]
         if self.scene.is_undrained:
-            self.nodes[:, V_MS] += held[:, B_MN]
+            self.nodes["mass_solid"] += held["mass_pore_liquid"]
         self.status[:] = 0
         self._limits[:], self.longest_step = (dt, 0.0), math.inf
         return self.step()
@@ -181,12 +165,12 @@ class Amplification:
         self.column = column
         self.solver = solver = SteppedAt(column.scene(), column.mesh(), threads=1)
         if column.positions != "layout":
-            solver.points[:, [X, Y]] = _placed(solver, column)
-        solver.points[:, [SXX, SYY, SXY]] = 0.0
+            block(solver.points, "x", "y")[:] = _placed(solver, column)
+        solver.points[["stress_xx", "stress_yy", "stress_xy"]] = 0.0
         self._wet = column.bulk_modulus is not None
         speed = solver.wave_speed * SMALL
         stress = speed * solver.wave_speed * 2000.0
-        solver.points[:, P] = 10 * stress if self._wet else 0.0  # positive, whatever is added
+        solver.points["pore_pressure"] = 10 * stress if self._wet else 0.0  # positive, whatever is added
         solver.limit_speed = solver.wave_speed
         self.altitude = solver.time_step_estimate()[0]
         self.spectral, _ = spectral_time_step(Spectrum(solver).of_state(), 0.5 * self.altitude)
@@ -258,29 +242,33 @@ class Amplification:
         """Invariant space: (column of the points, orthonormal basis, scale) a field."""
         solver = self.solver
         element, geometry = solver.element_of_point, solver.geometry[solver.element_of_point]
-        d = solver.points[:, [X, Y]] - geometry[:, 4:6]
-        n1 = geometry[:, 0] * d[:, 0] + geometry[:, 1] * d[:, 1]
-        n2 = geometry[:, 2] * d[:, 0] + geometry[:, 3] * d[:, 1]
+        d = values(solver.points, ("x", "y")) - values(geometry, ("x", "y"))
+        n1 = geometry["dn1_dx"] * d[:, 0] + geometry["dn1_dy"] * d[:, 1]
+        n2 = geometry["dn2_dx"] * d[:, 0] + geometry["dn2_dy"] * d[:, 1]
         hats = np.zeros((len(d), len(solver.mesh.nodes)))
         for k, weight in enumerate((1 - n1 - n2, n1, n2)):
             np.add.at(hats, (np.arange(len(d)), solver.mesh.elements[element, k]), weight)
         steps = (element[:, None] == np.arange(len(solver.geometry))).astype(float)
         slopes = np.hstack([steps * n1[:, None], steps * n2[:, None]])
         hats, steps, linear = (_orthonormal(a) for a in (hats, steps, np.hstack([steps, slopes])))
-        velocities = (VSX, VSY, VLX, VLY) if self._wet else (VSX, VSY)
+        velocities = (
+            ("velocity_solid_x", "velocity_solid_y", "velocity_liquid_x", "velocity_liquid_y")
+            if self._wet
+            else ("velocity_solid_x", "velocity_solid_y")
+        )
         spaces = [(k, hats, speed) for k in velocities]
-        spaces += [(k, steps, stress) for k in (SXX, SYY, SXY)]
+        spaces += [(k, steps, stress) for k in ("stress_xx", "stress_yy", "stress_xy")]
         if self._wet:
-            spaces.append((P, linear, stress))
+            spaces.append(("pore_pressure", linear, stress))
         return spaces
 
     def _set(self, changes):
         _restore(self.solver, self._start)
-        for k, values in changes.items():
-            self.solver.points[:, self._spaces[k][0]] += values
+        for k, change in changes.items():
+            self.solver.points[self._spaces[k][0]] += change
 
     def _get(self):
-        return [self.solver.points[:, column].copy() for column, _, _ in self._spaces]
+        return [self.solver.points[column].copy() for column, _, _ in self._spaces]
 
 
 ARRAYS = ("points", "nodes", "element_of_point", "start", "order", "occupied", "contents")
@@ -291,8 +279,8 @@ def _copied(solver):
 
 
 def _restore(solver, arrays):
-    for name, values in arrays.items():
-        getattr(solver, name)[...] = values
+    for name, kept in arrays.items():
+        getattr(solver, name)[...] = kept
     solver.time, solver.step_count, solver.long_step_count = 0.0, 0, 0
 
 

@@ -4,26 +4,11 @@ import math
 
 import numpy as np
 
-from mpm.variables import (
-    B_MS,
+from mpm.fields import (
     CLAMPS,
-    MASS,
     POROSITY_CEILING,
     POROSITY_FLOOR,
-    S_G,
-    S_LAMBDA,
-    SXX,
-    SXY,
-    SYY,
-    SZZ,
-    VLX,
-    VLY,
-    VSX,
-    VSY,
-    N,
-    P,
-    X,
-    Y,
+    values,
 )
 
 ENERGY_SLACK = 0.05  # of the largest energy in play: volumes change, points change elements
@@ -46,7 +31,7 @@ class Monitor:
         self.stored = strain_energy(solver)
         self._start = self.kinetic + self.stored
         self._at_first = self.stored
-        self.grain_mass = float(np.sum(solver.points[:, MASS]))
+        self.grain_mass = float(np.sum(solver.points["grain_mass"]))
         self.stress_bound = 0.0
         self.most_stress = self.most_speed = 0.0
         self.work = self.balance = 0.0
@@ -57,7 +42,7 @@ class Monitor:
         self.times = [0.0]
         self._initial_stress = largest_stress(solver)
         depth = float(solver.mesh.nodes[:, 1].max() - solver.mesh.nodes[:, 1].min())
-        self._mixture = float((solver.points[:, MASS] + pore_water(solver)).sum() / solver._volumes().sum())
+        self._mixture = float((solver.points["grain_mass"] + pore_water(solver)).sum() / solver._volumes().sum())
         self._static = self._initial_stress + self._mixture * solver.scene.gravity * depth
 
     def step(self, dt_max=math.inf):
@@ -67,7 +52,11 @@ class Monitor:
         inside = solver.element_of_point >= 0
         points = solver.points[inside]
         water = pore_water(solver)[inside]
-        self.work -= dt * solver.scene.gravity * float(points[:, MASS] @ points[:, VSY] + water @ points[:, VLY])
+        self.work -= (
+            dt
+            * solver.scene.gravity
+            * float(points["grain_mass"] @ points["velocity_solid_y"] + water @ points["velocity_liquid_y"])
+        )
         self.kinetic = kinetic_energy(solver)
         before, self.stored = self.stored, strain_energy(solver)
         self.most_kinetic = max(self.most_kinetic, self.kinetic)
@@ -83,10 +72,12 @@ class Monitor:
     def check(self):
         """What is too dear for every step: mass at the nodes, stresses, speeds, inflow."""
         solver = self.solver
-        held = float(solver.sums[:, :, B_MS].sum()) + solver.removed_mass
+        held = float(solver.sums["mass_solid"].sum()) + solver.removed_mass
         self.mass_error = max(self.mass_error, abs(held / self.grain_mass - 1.0))
         inside = solver.element_of_point >= 0
-        velocity = solver.points[inside][:, [VSX, VSY, VLX, VLY]]
+        velocity = values(
+            solver.points[inside], ("velocity_solid_x", "velocity_solid_y", "velocity_liquid_x", "velocity_liquid_y")
+        )
         self.most_speed = max(self.most_speed, float(np.hypot(velocity[:, ::2], velocity[:, 1::2]).max(initial=0.0)))
         self.most_stress = max(self.most_stress, largest_stress(solver))
         self.stress_bound = HAMMER * (self._static + self._mixture * solver.wave_speed * self.most_speed)
@@ -110,9 +101,9 @@ class Monitor:
         if self.most_stress > self.stress_bound:
             faults.append(f"stress {self.most_stress:.3g} Pa beyond {self.stress_bound:.3g} Pa")
         low, high = solver.mesh.nodes.min(axis=0) - 1e-9, solver.mesh.nodes.max(axis=0) + 1e-9
-        if ((state[:, [X, Y]] < low) | (state[:, [X, Y]] > high)).any():
+        if ((values(state, ("x", "y")) < low) | (values(state, ("x", "y")) > high)).any():
             faults.append("a point lies outside the mesh")
-        if ((state[:, N] < POROSITY_FLOOR) | (state[:, N] > POROSITY_CEILING)).any():
+        if ((state["porosity"] < POROSITY_FLOOR) | (state["porosity"] > POROSITY_CEILING)).any():
             faults.append("a porosity is out of its range")
         return faults
 
@@ -141,31 +132,38 @@ class Monitor:
 
 def pore_water(solver):
     """Mass of the pore water of every point [kg/m]."""
-    return solver._volumes() * solver.points[:, N] * solver._water_density
+    return solver._volumes() * solver.points["porosity"] * solver._water_density
 
 
 def kinetic_energy(solver):
     """Of grains and pore water [J/m]."""
     inside = solver.element_of_point >= 0
     p = solver.points[inside]
-    grains = p[:, MASS] @ (p[:, VSX] ** 2 + p[:, VSY] ** 2)
-    return 0.5 * float(grains + pore_water(solver)[inside] @ (p[:, VLX] ** 2 + p[:, VLY] ** 2))
+    grains = p["grain_mass"] @ (p["velocity_solid_x"] ** 2 + p["velocity_solid_y"] ** 2)
+    return 0.5 * float(
+        grains + pore_water(solver)[inside] @ (p["velocity_liquid_x"] ** 2 + p["velocity_liquid_y"] ** 2)
+    )
 
 
 def strain_energy(solver):
     """Stored in skeleton and water [J/m]: 1/2 sigma : C^-1 : sigma + p^2 n / (2 K_w), times the volume."""
     inside = solver.element_of_point >= 0
     p, volume = solver.points[inside], solver._volumes()[inside]
-    shear, lam = (solver.soils[solver.soil_of_point[inside], k] for k in (S_G, S_LAMBDA))
-    trace = p[:, SXX] + p[:, SYY] + p[:, SZZ]
-    square = p[:, SXX] ** 2 + p[:, SYY] ** 2 + p[:, SZZ] ** 2 + 2 * p[:, SXY] ** 2
+    shear, lam = (solver.soils[name][solver.soil_of_point[inside]] for name in ("shear", "lame"))
+    trace = p["stress_xx"] + p["stress_yy"] + p["stress_zz"]
+    square = p["stress_xx"] ** 2 + p["stress_yy"] ** 2 + p["stress_zz"] ** 2 + 2 * p["stress_xy"] ** 2
     energy = (square - lam / (3 * lam + 2 * shear) * trace**2) / (4 * shear)
     if solver._water_modulus:
-        energy = energy + np.maximum(p[:, P], 0.0) ** 2 * p[:, N] / (2 * solver._water_modulus)
+        energy = energy + np.maximum(p["pore_pressure"], 0.0) ** 2 * p["porosity"] / (2 * solver._water_modulus)
     return float(volume @ energy)
 
 
 def largest_stress(solver):
     """Largest effective stress or pore pressure of the points in the mesh [Pa]; a negative pressure carries nothing."""
     p = solver.points[solver.element_of_point >= 0]
-    return float(max(np.abs(p[:, [SXX, SYY, SZZ, SXY]]).max(initial=0.0), p[:, P].max(initial=0.0)))
+    return float(
+        max(
+            np.abs(values(p, ("stress_xx", "stress_yy", "stress_zz", "stress_xy"))).max(initial=0.0),
+            p["pore_pressure"].max(initial=0.0),
+        )
+    )

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
+from mpm.fields import block
 from mpm.meshing import build_mesh
 from mpm.scene import Scene
 from mpm.solver import Solver
-from mpm.variables import MASS, SXX, SXY, SYY, SZZ, VLX, VSX, N, P, X, Y
 from verification.problems.boxes import box_mesh
 from verification.stability.extremes import follow
 from verification.stability.monitor import Monitor
@@ -71,9 +71,9 @@ def slurry(size=0.1, seconds=0.5, **settings):
     scene = box_scene(size, **settings)
     solver = Solver(scene, box_of(size, 0, 6, 0, 6), threads=1)
     _unload(solver, 2 * size)
-    solver.points[:, MASS] *= (1 - 0.7) / (1 - solver.points[:, N])
-    solver.points[:, N] = 0.7
-    solver.points[:, [SXX, SYY, SZZ, SXY]] = 0.0
+    solver.points["grain_mass"] *= (1 - 0.7) / (1 - solver.points["porosity"])
+    solver.points["porosity"] = 0.7
+    solver.points[["stress_xx", "stress_yy", "stress_zz", "stress_xy"]] = 0.0
     return follow(Monitor(solver), seconds)
 
 
@@ -82,9 +82,9 @@ def jet(size=0.1, speed=30.0, seconds=0.3, **settings):
     scene = box_scene(size, **settings)
     solver = Solver(scene, box_of(size, 0, 3, 3, 6), threads=1)
     _free(solver)
-    solver.points[:, VSX] = speed
+    solver.points["velocity_solid_x"] = speed
     if scene.water is not None:
-        solver.points[:, VLX] = speed
+        solver.points["velocity_liquid_x"] = speed
     return follow(Monitor(solver), seconds)
 
 
@@ -95,12 +95,12 @@ def one_point(size=0.1, seconds=2.0, **settings):
     mesh.region[np.flatnonzero(mesh.region == 0)[1:]] = 3
     solver = Solver(scene, mesh, threads=1)
     _free(solver)
-    start = float(solver.points[0, Y])
+    start = float(solver.points["y"][0])
     monitor = Monitor(solver)
     lowest = [start]
 
     def look():
-        lowest.append(float(solver.points[0, Y]))
+        lowest.append(float(solver.points["y"][0]))
 
     looks = [(t, look) for t in np.linspace(0, seconds, 200, endpoint=False)]
     faults, measures = follow(monitor, seconds, events=looks)
@@ -169,7 +169,7 @@ def filled_tunnel(seconds=0.3, **settings):
     if abs(moved) > 1e-3:
         faults.append(f"{moved:.2%} of the content came in through the gate of a full tunnel")
     # the wall bears the corners of the gate in one direction only, so they give way at first
-    last = math.sqrt(2 * monitor.kinetic / float(np.sum(solver.points[:, MASS])))
+    last = math.sqrt(2 * monitor.kinetic / float(np.sum(solver.points["grain_mass"])))
     if last > REST:
         faults.append(f"does not come to rest: {last:.2g} m/s")
     return faults, measures | {"last_speed": last}
@@ -203,18 +203,18 @@ def _unload(solver, depth):
     """Move the initial stress down by `depth` [m]: that of a surface at y = -depth."""
     from mpm.points import initial_stress
 
-    below = np.maximum(-solver.points[:, Y] - depth, 0.0)
+    below = np.maximum(-solver.points["y"] - depth, 0.0)
     vertical, pressure = initial_stress(solver.scene, below)
-    solver.points[:, P] = pressure
-    solver.points[:, SYY] = -vertical
-    solver.points[:, SXX] = solver.points[:, SZZ] = (
+    solver.points["pore_pressure"] = pressure
+    solver.points["stress_yy"] = -vertical
+    solver.points["stress_xx"] = solver.points["stress_zz"] = (
         -solver.scene.soils[0].lateral_pressure_coefficient(vertical) * vertical
     )
 
 
 def _free(solver):
     """No stress at all."""
-    solver.points[:, [SXX, SYY, SZZ, SXY, P]] = 0.0
+    solver.points[["stress_xx", "stress_yy", "stress_zz", "stress_xy", "pore_pressure"]] = 0.0
 
 
 def _place(solver, positions):
@@ -229,4 +229,4 @@ def _place(solver, positions):
     elif positions == "vertices":
         weight = np.eye(3)[k]
     corners = solver.mesh.nodes[solver.mesh.elements[solver.element_of_point]]
-    solver.points[:, [X, Y]] = np.einsum("pk,pkd->pd", weight, corners)
+    block(solver.points, "x", "y")[:] = np.einsum("pk,pkd->pd", weight, corners)
