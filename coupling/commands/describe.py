@@ -11,7 +11,7 @@ from coupling.datasets import RunFileError, opened, read_attributes, read_histor
 from coupling.files.folder import RUN_FILE, how_to_go_on
 from coupling.files.own_content import require_own_content
 from coupling.refused import Refused
-from coupling.studies.execute import STUDY_FILE
+from coupling.studies.folder import STUDY_FILE, case_file
 
 SIGNATURES = {b"\x89HDF\r\n\x1a\n": "netcdf", b"\x89PNG\r\n\x1a\n": "png", b"GIF8": "gif", b"CDF": "netcdf3"}
 
@@ -59,7 +59,6 @@ def _folder(path):
 
 def _study(path):
     from coupling.studies.collect import stored_cases
-    from coupling.studies.execute import case_file
 
     plan, cases, failures = stored_cases(path)
     finished = sum(case_file(path, case).is_file() for case in cases)

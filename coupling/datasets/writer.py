@@ -1,13 +1,12 @@
 """The writer that appends to a run file while the run goes on."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import math
 import time as clock
 from pathlib import Path
 
+import h5netcdf
 import numpy as np
 
 from coupling.datasets.additions import CHECKED_FORMAT, append_to
@@ -139,8 +138,6 @@ class RunWriter:
         self._last_write = clock.monotonic()
 
     def _create(self, attributes, geometry, mesh):
-        import h5netcdf
-
         image = io.BytesIO()
         with h5netcdf.File(image, "w", libver=CHECKED_FORMAT) as file:
             for name, value in {**attributes, "status": "running", "status_message": ""}.items():

@@ -1,16 +1,10 @@
 """Points of a snapshot averaged in the elements of the mesh, and how much neighbouring elements differ."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
 
 from coupling.datasets.geometry import gate_position
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from numpy.typing import NDArray
 
 
 def element_means(

@@ -1,16 +1,10 @@
 """Fields of the ground on the mesh, snapshot by snapshot: what can be interpolated to an inflow mass."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
 
 from coupling.postprocess.elements import cell_means, element_centres, element_of_points
 from coupling.postprocess.ground_axes import QUANTITIES, point_quantities
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def element_fields(points: xr.Dataset, mesh: xr.Dataset) -> xr.Dataset:
@@ -32,8 +26,6 @@ def element_fields(points: xr.Dataset, mesh: xr.Dataset) -> xr.Dataset:
         Variables of :data:`coupling.postprocess.ground_axes.QUANTITIES` and deviatoric_strain [-] (time, element), NaN
         in empty elements; x, y (element): centres [m]. Attributes of the mesh.
     """
-    import xarray as xr
-
     if "time" not in points.dims:
         points = points.expand_dims("time")
     about = {**QUANTITIES, "deviatoric_strain": ("1", "accumulated equivalent deviatoric strain")}

@@ -1,17 +1,11 @@
 """Stresses and pore pressure along the horizontal and vertical axis through the gate, and how far the gate reaches."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
 
 from coupling.datasets.geometry import gate_diameter, gate_of, gate_position, tunnel_list
 from coupling.postprocess.elements import cell_means
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from numpy.typing import NDArray
 
 #: Initial stresses below this share of the largest on the axis are left out of ratios: those at the ground surface.
 SMALLEST_INITIAL = 0.05
@@ -56,8 +50,6 @@ def profile(points: xr.Dataset, direction: str, spacing: float = 0.5, half_width
     ValueError
         Neither direction.
     """
-    import xarray as xr
-
     if direction not in ("horizontal", "vertical"):
         raise ValueError(f"profile: direction must be 'horizontal' or 'vertical', got {direction!r}")
     if "time" not in points.dims:
@@ -159,8 +151,6 @@ def arch(axis: xr.Dataset, name: str = "soil_stress_vertical", window: float = 1
         distance (time) [m] from the gate, diameters (time) [D], ratio (time) [-]; the first two NaN where the stress is
         raised by less than 2 %, twice what averages over a cell scatter by at rest.
     """
-    import xarray as xr
-
     change = _on_ground_side(stress_variation(axis[name], axis[name].isel(time=0, drop=True)), axis)
     ratio = 1.0 + _smoothed(change, window)
     largest = ratio.max("distance")

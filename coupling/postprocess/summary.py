@@ -1,22 +1,17 @@
 """What a run came to, in a few numbers: the table and the JSON of `gush run` and `gush respond`."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from coupling.datasets import opened, read_attributes, read_history, read_pressures
 from coupling.datasets.geometry import on_tunnel, tunnels_beside
+from coupling.datasets.open_run import Run
 from coupling.postprocess.extremes import extremes
 from coupling.postprocess.quality import lining_equilibrium, quality, verdicts
 from mpm.variables import CLAMPS
 from structure.response import FORCES
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from coupling.datasets.open_run import Run
 
 PLACES = {"crown": 0, "right waist": 90, "invert": 180, "left waist": 270}
 

@@ -4,6 +4,7 @@ import time as clock
 from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from coupling.datasets.geometry import gate_of
 from coupling.files.provenance import origin, with_history
@@ -99,8 +100,6 @@ def _gate_options(source, cut):
 
 def _differences(first, second, ring):
     """Second less first, with the offset of the curved section and what is left without it."""
-    import xarray as xr
-
     from structure.theory import curved_section_moment
 
     missing = sorted(set(QUANTITIES) - set(first.data_vars) | set(QUANTITIES) - set(second.data_vars))

@@ -1,21 +1,16 @@
 """The answer of a ring to the pressures on its tunnel, by a lining model of some name."""
 
-from __future__ import annotations
+from collections.abc import Iterator
+from typing import Any
 
-from typing import TYPE_CHECKING, Any
+import xarray as xr
 
 from coupling.datasets.geometry import on_tunnel, tunnels_beside
 from coupling.refused import Refused, SceneError
 from coupling.scenes.rings import gate_tunnel, ring_of
+from coupling.scenes.scene import Scene
 from structure.models import model_name
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    import xarray as xr
-
-    from coupling.scenes.scene import Scene
-    from structure.ring import Ring
+from structure.ring import Ring
 
 
 def respond(scene: Scene, pressures: xr.Dataset, backend: str = "beam-spring", tunnel: int | None = None) -> xr.Dataset:

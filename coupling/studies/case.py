@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-#: In a case's folder: what of it goes into the study's dataset, written last, so it exists only when all is done.
-CASE_FILE = "case.nc"
-RUN_FOLDER = "run"
+from coupling.studies.folder import CASE_FILE, RUN_FOLDER
+from coupling.studies.progress import CaseProgress
+
 #: Quantities over time that a case keeps besides pressures and response.
 PROGRESS = ("time", "flow_zone_area", "disturbed_area", "suspended_fraction", "max_velocity")
 
@@ -49,7 +49,6 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, 
     from coupling.responses.respond import responses_on
     from coupling.runs.run import run
     from coupling.scenes.scene import parse_scene
-    from coupling.studies.progress import CaseProgress
     from structure.models import lining_model, model_name
 
     place = Path(folder)

@@ -12,7 +12,8 @@ import numpy as np
 from coupling.datasets.group import read_group_at_once
 from coupling.files.provenance import origin, with_history
 from coupling.scenes.scene import unit_of
-from coupling.studies.design import Case, Study, StudyError
+from coupling.studies.design import Case, Study, StudyError, cases, stored_study
+from coupling.studies.folder import STATUS_FILE, case_file
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,7 +41,6 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     """
     import xarray as xr
 
-    from coupling.studies.execute import case_file
     from structure.lining import at_whole_degrees
 
     there = [case for case in cases if case_file(folder, case).is_file()]
@@ -133,9 +133,6 @@ def stored_cases(folder: str | Path) -> tuple[Study, list[Case], dict[str, str]]
     coupling.studies.design.StudyError
         No study there, or its files are damaged.
     """
-    from coupling.studies.design import cases, stored_study
-    from coupling.studies.execute import STATUS_FILE
-
     folder = Path(folder)
     plan = stored_study(folder)
     found = cases(plan)

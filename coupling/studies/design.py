@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import itertools
 import json
@@ -10,22 +9,22 @@ import math
 import re
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from coupling.refused import SceneError
-from coupling.scenes.layers import changed, nested, parse_toml, read_scene_data, read_toml_file
+from coupling.scenes.layers import changed, nested, parse_toml, read_scene_data, ready_names, text_of
 from coupling.scenes.lines import line_of
 from coupling.scenes.scene import Scene, make_scene, number_in_unit
+from coupling.studies.folder import STUDY_FILE
+from mpm.scene import Part
 from structure.inputs import mistakes
 
 #: Changes when stored cases can no longer be used.
 FORMAT = "2"
-STUDY_FILE = "study.json"
 #: What stands for a whole table that a case leaves as the scene has it, and for a case that changes nothing.
 AS_IT_IS = "as it is"
 
@@ -34,10 +33,8 @@ class StudyError(SceneError):
     """A study that cannot be run: where, rule, value, remedy."""
 
 
-class Range(BaseModel):
+class Range(Part):
     """Values between `low` and `high`, spaced evenly or by their logarithm."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     low: float
     high: float
@@ -58,7 +55,7 @@ class Range(BaseModel):
         return self.low + share * (self.high - self.low)
 
 
-class Study(BaseModel):
+class Study(Part):
     """A study.
 
     Parameters
@@ -85,13 +82,11 @@ class Study(BaseModel):
         Number of inflow masses, from 0 to the stop's, at which cases are compared.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
     name: str = Field(min_length=1, max_length=60, pattern=r"^\w[\w.-]*$")
     scene: str = "quick"
     design: Literal["factorial", "list", "one-at-a-time", "latin-hypercube", "sobol"] = "factorial"
     parameters: dict[str, tuple[Any, ...] | Range] = Field(min_length=1)
-    fixed: dict[str, Any] = {}
+    fixed: dict[str, Any] = Field(default_factory=dict)
     samples: int | None = Field(default=None, ge=2, le=100_000)
     seed: int = 0
     backends: tuple[str, ...] = ("beam-spring",)
@@ -142,19 +137,16 @@ class Study(BaseModel):
 
     def combinations(self) -> list[dict[str, Any]]:
         """What every case changes in the scene, by dotted name: all parameters, or only one in "one-at-a-time"."""
-        names = list(self.parameters)
-        if self.design == "factorial":
-            return [dict(zip(names, values, strict=True)) for values in itertools.product(*self.parameters.values())]
-        if self.design == "list":
-            return [dict(zip(names, values, strict=True)) for values in zip(*self.parameters.values(), strict=True)]
+        names, lists = list(self.parameters), self.parameters.values()
+        if self.design in ("factorial", "list"):
+            rows = itertools.product(*lists) if self.design == "factorial" else zip(*lists, strict=True)
+            return [dict(zip(names, values, strict=True)) for values in rows]
         if self.design == "one-at-a-time":
             return [{}, *({name: value} for name, values in self.parameters.items() for value in values)]
         from scipy.stats import qmc
 
-        if self.design == "sobol":
-            shares = qmc.Sobol(len(names), rng=self.seed).random(self.samples)
-        else:
-            shares = qmc.LatinHypercube(len(names), rng=self.seed).random(self.samples)
+        sampler = qmc.Sobol if self.design == "sobol" else qmc.LatinHypercube
+        shares = sampler(len(names), rng=self.seed).random(self.samples)
         return [
             {name: self.parameters[name].at(float(share)) for name, share in zip(names, row, strict=True)}
             for row in shares
@@ -208,7 +200,7 @@ def load_study(study: str | Path | dict | Study) -> Study:
     if is_folder(study):
         return stored_study(study)
     origin = "study" if isinstance(study, dict) else f"study '{study}'"
-    text = "" if isinstance(study, dict) else _read(str(study))
+    text = "" if isinstance(study, dict) else text_of("study", str(study), "studies", StudyError)
     data = study if isinstance(study, dict) else parse_toml(text, origin)
     try:
         return Study.model_validate(data)
@@ -253,8 +245,7 @@ def stored_study(folder: str | Path) -> Study:
 
 def study_names() -> list[str]:
     """Names of the built-in studies."""
-    files = resources.files("coupling") / "studies" / "ready"
-    return sorted(entry.name.removesuffix(".toml") for entry in files.iterdir() if entry.name.endswith(".toml"))
+    return ready_names("studies")
 
 
 def cases(study: Study) -> list[Case]:
@@ -340,14 +331,8 @@ def _value_in(scene, name):
 def _code() -> str:
     """Hash of the sources that decide a result: `mpm`, `structure`, and what turns a run into a case."""
     total = hashlib.sha256(FORMAT.encode())
-    for package in (
-        "mpm",
-        "structure",
-        "coupling.studies.case",
-        "coupling.runs",
-        "coupling.responses",
-        "coupling.datasets",
-    ):
+    ours = (f"coupling.{room}" for room in ("datasets", "responses", "runs", "studies.case"))
+    for package in ("mpm", "structure", *ours):
         origin = Path(find_spec(package).origin)
         for file in sorted(origin.parent.rglob("*.py")) if origin.name == "__init__.py" else [origin]:
             total.update(file.read_bytes())
@@ -364,21 +349,3 @@ def _source_of(backend):
     """What decides the answers of a lining model besides the sources of this program."""
     file = Path(backend.rpartition(":")[0])
     return backend + file.read_text(encoding="utf-8") if ".py:" in backend and file.is_file() else backend
-
-
-def _read(name: str) -> str:
-    try:
-        if name in study_names():
-            text = (resources.files("coupling") / "studies" / "ready" / f"{name}.toml").read_text(encoding="utf-8")
-        elif Path(name).exists():
-            text = read_toml_file(Path(name), f"study {name!r}")
-        else:
-            raise FileNotFoundError
-    except FileNotFoundError:
-        near = difflib.get_close_matches(name, study_names(), 1)
-        hint = f"did you mean {near[0]!r}? " if near else ""
-        raise StudyError(
-            f"study {name!r}: must be a built-in study or a file, got neither; {hint}built-in:"
-            f" {', '.join(study_names())}"
-        ) from None
-    return text

@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coupling.files.replace import replace_file
-from coupling.studies.case import CASE_FILE, run_case
-from coupling.studies.design import STUDY_FILE, Case, Study, StudyError, cases, check_backends, is_folder, load_study
+from coupling.studies.case import run_case
+from coupling.studies.design import Study, StudyError, cases, check_backends, is_folder, load_study
+from coupling.studies.folder import CASES, STATUS_FILE, STUDY_FILE, case_file
 from coupling.studies.progress import StudyState, watching
 
 if TYPE_CHECKING:
@@ -25,7 +26,6 @@ LOSSES = 3
 LONGEST_WITHOUT_WORKERS = 60.0
 #: What collecting and storing the cases loads; loaded while the workers load what they need.
 COLLECTING = ("xarray", "structure.lining", "pint", "h5netcdf", "dask.array")
-CASES, STATUS_FILE, DATA_FILE = "cases", "status.json", "study.nc"
 
 
 def study(
@@ -115,11 +115,6 @@ def _check_arguments(out, workers):
     whole = isinstance(workers, numbers.Integral) and not isinstance(workers, bool)
     if workers is not None and not (whole and workers >= 0):
         raise StudyError(f"workers: must be a whole number from 0, got {workers!r}; leave it out for one a core")
-
-
-def case_file(folder: Path, case: Case) -> Path:
-    """Where the results of a case are once it is done."""
-    return folder / CASES / case.key / CASE_FILE
 
 
 def _run(plan, missing, folder, workers, scheduler):

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from coupling.files.replace import replace_file
+from coupling.studies.folder import CASE_FILE, PROGRESS_FILE
 
-PROGRESS_FILE = "progress.json"
 SECONDS_BETWEEN_STATES = 1.0
 #: A case that has not written for so long is taken for lost; the slowest stage between two states takes some seconds.
 SECONDS_UNTIL_LOST = 120.0
@@ -77,8 +77,6 @@ def study_state(folder: Path, numbers: dict[str, int], failures: dict[str, str])
     failures : dict of str to str
         Keys of those that have failed.
     """
-    from coupling.studies.case import CASE_FILE
-
     done, running = 0, {}
     for key, number in numbers.items():
         place = folder / key

@@ -25,7 +25,8 @@ def run_study(name, out, workers, scheduler, console):
     """
     from coupling.datasets import write_dataset
     from coupling.studies.design import cases, load_study
-    from coupling.studies.execute import DATA_FILE, study, study_folder
+    from coupling.studies.execute import study, study_folder
+    from coupling.studies.folder import DATA_FILE
     from coupling.studies.progress import StudyLine
 
     plan = load_study(name)
