@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from coupling.commands.exit_codes import JsonPath, checked_json, failures, told_warnings, write_json
+from coupling.commands.exit_codes import JsonPath, answering, say
 from coupling.commands.options import SOURCE, RingScene
 from coupling.commands.tables import response_table
 
@@ -14,7 +14,7 @@ from coupling.commands.tables import response_table
 def draw_checks(checked, file, model, own_file=None, tunnel=None):
     """Draw the checks beside a run's figures, or beside the response's own file and named after it; returns the path.
 
-    file : path, of the run;  own_file : path or None, from :func:`coupling.responses.stored.chosen_file`;  tunnel : int
+    file : path, of the run;  own_file : path or None, from :func:`coupling.responses.respond.chosen_file`;  tunnel : int
     or None, of those without the gate.
     """
     from coupling.figures import RESOLUTION
@@ -55,13 +55,16 @@ def respond_command(
     response); with --limits `utilisations` (largest of every check, 1 is its limit) and `figure` (path). Of several
     tunnels these are of that with the gate, `tunnels` has the same of the others.
     """
-    with failures(), checked_json(json_path), told_warnings():
-        from coupling.commands.respond import draw_checks
+    with answering(json_path) as told:
         from coupling.postprocess.summary import summarise_response
-        from coupling.responses.limits import read_limits, with_checks
-        from coupling.responses.respond import respond_by_name
+        from coupling.responses.respond import (
+            chosen_file,
+            read_limits,
+            respond_by_name,
+            store_response,
+            with_checks,
+        )  # fmt: skip
         from coupling.responses.source import read_sources
-        from coupling.responses.stored import chosen_file, store_response
 
         sources = read_sources(run, scene)
         given = None if limits is None else read_limits(limits)
@@ -80,15 +83,13 @@ def respond_command(
         data = {"run": str(run), "backend": name, **answers[0]}
         if len(sources) > 1:
             data["tunnels"] = {source.tunnel: answer for source, answer in zip(sources[1:], answers[1:], strict=True)}
-        write_json(json_path, data)
-        if str(json_path) != "-":
-            console = Console()
+        if told(data):
             for source, answer in zip(sources, answers, strict=True):
-                console.print(response_table(answer, source.tunnel))
+                Console().print(response_table(answer, source.tunnel))
                 if given is not None:
                     shares = ", ".join(
                         f"{check.replace('_', ' ')} {share:.2f}" for check, share in answer["utilisations"].items()
                     )
-                    console.print(f"largest of its limit: {shares}", highlight=False)
-                    console.print(f"picture in {answer['figure']}", highlight=False, soft_wrap=True)
-                console.print(f"response in {answer['file']}", highlight=False, soft_wrap=True)
+                    say(f"largest of its limit: {shares}")
+                    say(f"picture in {answer['figure']}")
+                say(f"response in {answer['file']}")

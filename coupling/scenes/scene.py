@@ -30,8 +30,7 @@ from coupling.scenes.layers import (
 )
 from coupling.scenes.mistakes import mistake_line
 from coupling.scenes.plausibility import hints
-from coupling.scenes.ring_units import ring_in_si, ring_number, ring_unit
-from coupling.scenes.rings import derived_ring
+from coupling.scenes.rings import UNITS, derived_ring, ring_in_si, ring_number
 from mpm.scene import Scene as MpmScene
 from mpm.scene import quantity_in
 from structure.inputs import Input, mistakes, models_in, shortened, table_html
@@ -57,7 +56,7 @@ class Scene(Input, MpmScene):
     ring: Ring | None = None
 
     def __repr__(self) -> str:
-        from coupling.scenes.facts import facts
+        from coupling.scenes.features import facts
 
         rows = facts(self)
         width = max(len(what) for what, _ in rows)
@@ -66,7 +65,7 @@ class Scene(Input, MpmScene):
     __str__ = __repr__
 
     def _repr_html_(self) -> str:
-        from coupling.scenes.facts import facts
+        from coupling.scenes.features import facts
 
         text = f"<details><summary>the complete scene</summary><pre>{html.escape(self.source)}</pre></details>"
         rows = {what: html.escape(value) for what, value in facts(self)}
@@ -261,23 +260,22 @@ def number_in_unit(name: str, value: Any) -> Any:
     ValueError
         As :func:`mpm.scene.quantity_in`.
     """
-    parts = _without_numbers(name)
-    if parts[0] == "ring":
-        return ring_number(tuple(parts), value)
+    if name.startswith("ring."):
+        return ring_number(".".join(_without_numbers(name)[1:]), value)
     unit = unit_of(name)
     return value if unit is None else quantity_in(unit, value)
 
 
 def unit_of(name: str) -> str | None:
     """Unit of the key of a dotted name, as pint reads it; None where it has none, or where there is no such key."""
-    parts = _without_numbers(name)
-    if parts[0] == "ring":
-        return ring_unit(tuple(parts))
+    *tables, key = _without_numbers(name)
+    if tables[:1] == ["ring"]:
+        return UNITS.get(".".join([*tables[1:], key]))
     try:
         model = MpmScene
-        for part in parts[:-1]:
-            model = next(models_in(model.model_fields[part].annotation))
-        field = model.model_fields[parts[-1]]
+        for table in tables:
+            model = next(models_in(model.model_fields[table].annotation))
+        field = model.model_fields[key]
     except (KeyError, StopIteration):
         return None
     kinds = (field, *getattr(field.annotation, "__args__", ()))

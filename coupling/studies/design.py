@@ -17,7 +17,7 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 
 from coupling.refused import SceneError
 from coupling.scenes.layers import changed, nested, parse_toml, read_scene_data, ready_names, text_of
-from coupling.scenes.lines import line_of
+from coupling.scenes.mistakes import line_of
 from coupling.scenes.scene import Scene, make_scene, number_in_unit
 from coupling.studies.folder import STUDY_FILE
 from mpm.scene import Part
