@@ -14,8 +14,7 @@ from coupling.commands.tables import response_table
 def draw_checks(checked, file, model, own_file=None, tunnel=None):
     """Draw the checks beside a run's figures, or beside the response's own file and named after it; returns the path.
 
-    file : path, of the run;  own_file : path or None, from :func:`coupling.responses.respond.chosen_file`;  tunnel : int
-    or None, of those without the gate.
+    file : of the run;  own_file : from :func:`coupling.responses.respond.chosen_file`;  tunnel : without the gate.
     """
     from coupling.figures import RESOLUTION
     from coupling.figures.utilisations import checks

@@ -1,4 +1,4 @@
-"""The answer of a ring to the pressures on its tunnel: by a lining model, held against limits, and where it is stored."""
+"""The answer of a ring to pressures: by a lining model of some name, held against limits, and where it is stored."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -95,8 +95,8 @@ def with_checks(response: xr.Dataset, limits: Limits) -> tuple[xr.Dataset, dict[
 def chosen_file(source: Source, model: str, out: Path | None = None, overwrite: bool = False) -> Path | None:
     """The file of its own that a response goes into, checked before it is computed; None: it belongs into the run.
 
-    Without `out` that is the run where pressures and ring are its own, else `<file>-<model>.nc` beside the file. Tunnels
-    without the gate have `-tunnel-<number>` before the ending.
+    Without `out` that is the run where pressures and ring are its own, else `<file>-<model>.nc` beside the file. With
+    the number of a tunnel without the gate, `-tunnel-<number>` stands before the ending.
 
     Raises
     ------
@@ -122,9 +122,8 @@ def store_response(response: xr.Dataset, source: Source, model: str, path: Path 
     if path is None:
         write_response(source.file, response, model, source.tunnel)
         return source.file
-    told = with_history("", f"response of {model} to the pressures of {source.file.name}")
+    about = {"Conventions": "CF-1.11", **origin(), **response.attrs}
+    about["history"] = with_history("", f"response of {model} to the pressures of {source.file.name}")
     path.unlink(missing_ok=True)
-    write_dataset(
-        path, response.assign_attrs({"Conventions": "CF-1.11", **origin(), **response.attrs, "history": told})
-    )
+    write_dataset(path, response.assign_attrs(about))
     return path

@@ -1,22 +1,18 @@
 """All cases of a study in one dataset."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from coupling.datasets.group import read_group_at_once
 from coupling.files.provenance import origin, with_history
 from coupling.scenes.scene import unit_of
 from coupling.studies.design import Case, Study, StudyError, cases, stored_study
 from coupling.studies.folder import STATUS_FILE, case_file
-
-if TYPE_CHECKING:
-    import xarray as xr
+from structure.lining import at_whole_degrees
 
 #: Studies whose cases take less than this on the disk are held in memory.
 MOST_BYTES_IN_MEMORY = 5e8
@@ -28,21 +24,16 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     Returns
     -------
     xarray.Dataset
-        Variables of :func:`coupling.studies.case.at_inflow_masses` with `case` in front; parameters as coordinates
-        (case) in SI under their dotted names with `_` for `.`, and `case_name`; `status` (case) "finished" or
-        "failed", `message` (case);
-        failed cases are NaN. Attributes: `study`, its definition as JSON with the seed; `failed`, their number; source,
-        revision, versions.
+        Variables of :func:`coupling.studies.case.at_inflow_masses` with `case` in front, NaN in failed cases;
+        parameters as coordinates (case) in SI under their dotted names with `_` for `.`, and `case_name`; `status`
+        (case) "finished" or "failed", `message` (case). Attributes: `study`, its definition as JSON with the seed;
+        `failed`, their number; source, revision, versions.
 
     Raises
     ------
     coupling.studies.design.StudyError
         The file of a case is damaged.
     """
-    import xarray as xr
-
-    from structure.lining import at_whole_degrees
-
     there = [case for case in cases if case_file(folder, case).is_file()]
     parts, files = [], [case_file(folder, case) for case in there]
     small = sum(file.stat().st_size for file in files) < MOST_BYTES_IN_MEMORY
@@ -55,14 +46,13 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
             parts.append(at_whole_degrees(part, "theta_ring"))  # as earlier versions called the angles of the ring
         except (OSError, RuntimeError, ValueError, KeyError, AttributeError) as error:
             raise StudyError(unreadable(file, error)) from None
+    result = xr.Dataset(coords={"case": np.array([], int)})
     if parts:
         result = xr.concat(
             parts, dim=xr.IndexVariable("case", [case.index for case in there]), join="outer", data_vars="all",
             coords=["inflow_mass"], compat="override", combine_attrs="drop_conflicts",
         )  # fmt: skip
-        result = result.reindex(case=[case.index for case in cases])
-    else:
-        result = xr.Dataset(coords={"case": [case.index for case in cases]})
+    result = result.reindex(case=[case.index for case in cases])
     result["case"].attrs = {"units": "1", "long_name": "number of the case"}
     names = np.array([case.name for case in cases], dtype=str)
     result = result.assign_coords(case_name=("case", names, {"long_name": "what the case changes"}))

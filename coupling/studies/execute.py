@@ -25,7 +25,7 @@ LOSSES = 3
 #: Workers that were lost are started again within seconds [s].
 LONGEST_WITHOUT_WORKERS = 60.0
 #: What collecting and storing the cases loads; loaded while the workers load what they need.
-COLLECTING = ("xarray", "structure.lining", "pint", "h5netcdf", "dask.array")
+COLLECTING = ("coupling.studies.collect", "structure.lining", "pint", "dask.array")
 
 
 def study(
@@ -66,8 +66,6 @@ def study(
     StudyError
         Before anything runs: an invalid study or scene, or a folder that cannot be used.
     """
-    from coupling.studies.collect import collect
-
     _check_arguments(out, workers)
     plan = load_study(what)
     check_backends(plan)
@@ -93,12 +91,12 @@ def study(
         except KeyboardInterrupt as stop:
             stop.add_note(f"what is done is kept; go on with: gush study {folder}")
             raise
-    status = {
-        case.key: {"parameters": case.parameters, "status": "failed" if case.key in failures else "finished",
-                   "message": failures.get(case.key, "")}
-        for case in todo
-    }  # fmt: skip
+    outcome = {key: {"status": "failed", "message": message} for key, message in failures.items()}
+    finished = {"status": "finished", "message": ""}
+    status = {case.key: {"parameters": case.parameters, **outcome.get(case.key, finished)} for case in todo}
     _write_json(folder / STATUS_FILE, status)
+    from coupling.studies.collect import collect  # by now loaded beside the workers
+
     return collect(plan, todo, folder, failures)
 
 
