@@ -17,13 +17,8 @@ FOLDER, DIFFERENCES = "comparison", "differences.nc"
 def store(comparison, source, out=None):
     """Write differences, both responses and figures into a folder; returns what a table or JSON needs.
 
-    Parameters
-    ----------
-    comparison : Comparison
-    source : coupling.responses.source.Source
-    out : path, optional
-        `comparison/` beside the file when left out; only files of an earlier comparison are replaced. Tunnels without
-        the gate have folders of their own in it.
+    Without `out` the folder is `comparison/` beside the file; only files of an earlier comparison are replaced. Tunnels
+    without the gate have folders of their own in it.
 
     Returns
     -------

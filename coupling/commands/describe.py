@@ -19,10 +19,6 @@ SIGNATURES = {b"\x89HDF\r\n\x1a\n": "netcdf", b"\x89PNG\r\n\x1a\n": "png", b"GIF
 def describe(path: str | Path) -> dict[str, Any]:
     """What a path is.
 
-    Parameters
-    ----------
-    path : str or path
-
     Returns
     -------
     dict

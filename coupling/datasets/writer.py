@@ -55,16 +55,9 @@ class RunWriter:
 
     @classmethod
     def continued(cls, path, scene, records, snapshots, **attributes):
-        """Writer for a file that holds at least so many records and snapshots; what follows is written over.
+        """Writer for a file of which so many records and snapshots are kept; rows behind them stay until written again.
 
-        Parameters
-        ----------
-        path, scene
-            As of the class.
-        records, snapshots : int
-            Rows that are kept; rows behind them stay until they are written again.
-        **attributes
-            Root attributes to set.
+        **attributes : of the root, to set.
         """
         writer = cls.__new__(cls)
         writer._start(path, scene, records, snapshots)
@@ -101,14 +94,8 @@ class RunWriter:
     def close(self, status, message="", judged=None, **attributes):
         """Write what waits and how the run ended, and return the pressures on the lining.
 
-        Parameters
-        ----------
-        status : {"finished", "failed", "interrupted"}
-        message : str
-        judged : callable, optional
-            Takes the whole `/history` and gives more attributes.
-        **attributes
-            Root attributes to set.
+        status : "finished", "failed" or "interrupted";  judged : takes the whole `/history` and gives more attributes;
+        **attributes : of the root, to set.
         """
         with self._written_batch() as (file, content):
             run = OpenRun(self.path, content)

@@ -5,6 +5,8 @@ The line of a key is found with the parser of TOML itself: the shortest beginnin
 
 import re
 import tomllib
+from bisect import bisect_left
+from functools import cache
 from typing import Any
 
 from coupling.scenes.layers import Layer
@@ -49,8 +51,8 @@ def _source(path: tuple[Any, ...], layers: tuple[Layer, ...]) -> tuple[Layer | N
     return best, most
 
 
-def line_of(text, path):
-    """Number of the line on which the statement with a key begins.
+def line_of(text: str, path: tuple[Any, ...]) -> int | None:
+    """Number of the line, from 1, on which the statement with a key begins; None where the text has no such key.
 
     Parameters
     ----------
@@ -58,28 +60,29 @@ def line_of(text, path):
         Valid TOML.
     path : tuple of str and int
         Keys of tables and indices of lists, as ("soils", 0, "porosity").
-
-    Returns
-    -------
-    int or None
-        From 1; None where the text has no such key.
     """
-    prefixes = _Prefixes(text)
-    low, high = 0, len(prefixes.lines)
-    if not path or not holds(prefixes.parsed(high), path):
-        return None
+    lines = text.split("\n")
+
+    @cache
+    def parsed(count):
+        """Data of the first lines, None where they are no valid TOML: a statement over several lines is cut."""
+        if parsed.cache_info().misses > MOST_PARSES:
+            raise _TooLong
+        try:
+            return tomllib.loads("\n".join(lines[:count]))
+        except ValueError:
+            return None
+
+    def whole(count):
+        """The longest valid beginning of at most so many lines."""
+        return next(fewer for fewer in range(count, -1, -1) if parsed(fewer) is not None)
+
     try:
-        while high - low > 1:
-            middle = (low + high) // 2
-            count, data = prefixes.whole(middle)
-            if count > low and holds(data, path):
-                high = count
-            else:
-                low = middle
-        before, _ = prefixes.whole(high - 1)
+        if not path or not holds(parsed(len(lines)), path):
+            return None
+        return 1 + whole(bisect_left(range(len(lines)), True, key=lambda count: holds(parsed(whole(count)), path)) - 1)
     except _TooLong:
         return None
-    return before + 1
 
 
 def holds(data, path):
@@ -139,28 +142,4 @@ def entry_at(data, path):
 
 
 class _TooLong(Exception):
-    pass
-
-
-class _Prefixes:
-    """Beginnings of a text, parsed when asked for; a statement over several lines is whole or not there."""
-
-    def __init__(self, text):
-        self.lines, self._known = text.split("\n"), {}
-
-    def whole(self, count):
-        """The longest valid beginning of at most `count` lines, and its data."""
-        while (data := self.parsed(count)) is None:
-            count -= 1
-        return count, data
-
-    def parsed(self, count):
-        """Data of the first `count` lines, None where they are no valid TOML."""
-        if count not in self._known:
-            if len(self._known) >= MOST_PARSES:
-                raise _TooLong
-            try:
-                self._known[count] = tomllib.loads("\n".join(self.lines[:count]))
-            except ValueError:
-                self._known[count] = None
-        return self._known[count]
+    """A text that takes too long to search."""

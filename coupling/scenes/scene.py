@@ -216,9 +216,7 @@ def make_scene(data: dict[str, Any], origin: str = "scene", layers: tuple[Layer,
         layers = (*layers, *below)
     whole, data = data, dict(data)
     ring_data = data.pop("ring", None)
-    problems = _truth_values(data, MpmScene, ())
-    if isinstance(ring_data, dict):
-        problems += _truth_values(ring_data, Ring, ("ring",))
+    problems = _truth_values(whole, Scene, ())
     ground = ring = None
     try:
         ground = MpmScene.model_validate(data)
