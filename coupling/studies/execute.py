@@ -145,27 +145,36 @@ def _in_this_process(plan, missing, folder, threads):
 def _in_processes(plan, missing, folder, count, threads):
     from coupling.studies.pool import Pool, WorkerLost
 
-    calls = {case.key: _arguments(plan, case, folder, threads) for case in missing}
-    found = {case.key: case for case in missing}
-    losses: dict[str, int] = {}
-    with Pool(count) as pool:
-        for module in COLLECTING:
-            import_module(module)
-        for key, ended in pool.run(run_case, calls):
-            if isinstance(ended, WorkerLost):
-                losses[key] = 1
-            else:
-                yield found[key], ended
-        if not losses:
-            return
-    # what lost its process again, with nothing beside it, so that a further loss is its own doing
-    with Pool(1) as pool:
-        while losses:
-            for key, ended in pool.run(run_case, {key: calls[key] for key in losses}):
-                losses[key] += 1
-                if not isinstance(ended, WorkerLost) or losses[key] == LOSSES:
-                    yield found[key], _text(ended) if isinstance(ended, WorkerLost) else ended
-                    del losses[key]
+    def run(cases):
+        found = {case.key: case for case in cases}
+        calls = {key: _arguments(plan, case, folder, threads) for key, case in found.items()}
+        with Pool(min(count, len(cases))) as pool:
+            for module in COLLECTING:
+                import_module(module)
+            for key, ended in pool.run(run_case, calls):
+                lost = isinstance(ended, WorkerLost)
+                yield found[key], _text(ended) if lost else ended, lost
+
+    yield from _outlasting_losses(run, missing)
+
+
+def _outlasting_losses(run, missing):
+    """Cases and their failures as they end; `run` yields of some cases also whether their worker was lost.
+
+    What lost its worker is run again with nothing beside it, so that a further loss is its own doing.
+    """
+    again = []
+    for case, failure, lost in run(missing):
+        if lost:
+            again.append(case)
+        else:
+            yield case, failure
+    for case in again:
+        for _ in range(LOSSES - 1):
+            ((_, failure, lost),) = run([case])
+            if not lost:
+                break
+        yield case, failure
 
 
 def _on_cluster(plan, missing, folder, scheduler):
@@ -174,20 +183,13 @@ def _on_cluster(plan, missing, folder, scheduler):
 
     # Every loss of a worker comes back here at once: the scheduler would blame all cases that waited on it.
     with dask.config.set({"distributed.scheduler.allowed-failures": 0}), Client(scheduler) as client:
-        lost = []
         at_once = sum(worker["nthreads"] for worker in client.scheduler_info(n_workers=-1)["workers"].values())
-        for case, failure in _submitted(client, plan, missing, folder, max(at_once, 1)):
-            if isinstance(failure, _lost()):
-                lost.append(case)
-            else:
-                yield case, _text(failure)
-        for case in lost:
-            yield case, _alone(client, plan, case, folder)
+        yield from _outlasting_losses(lambda cases: _submitted(client, plan, cases, folder, max(at_once, 1)), missing)
 
 
 def _submitted(client, plan, todo, folder, at_once):
-    """Cases and their failures (or None) as they end, never more of them in work than there are threads."""
-    from distributed import as_completed
+    """Cases, their failures and whether their worker was lost, never more of them in work than there are threads."""
+    from distributed import CancelledError, KilledWorker, as_completed
 
     waiting = list(reversed(todo))
     running = {}
@@ -208,7 +210,7 @@ def _submitted(client, plan, todo, folder, at_once):
         failure = future.exception()
         if waiting:
             submit()
-        yield case, failure
+        yield case, _text(failure), isinstance(failure, KilledWorker | CancelledError)
 
 
 def _wait(client, pool):
@@ -229,21 +231,6 @@ def _wait(client, pool):
                 f"study: no worker has been there for {LONGEST_WITHOUT_WORKERS:g} s; what is done is kept, repeat the "
                 "command to go on"
             )
-
-
-def _alone(client, plan, case, folder):
-    """Run a case whose worker was lost with nothing beside it, so that a further loss is its own doing."""
-    for _ in range(LOSSES - 1):
-        (_, failure) = next(_submitted(client, plan, [case], folder, 1))
-        if not isinstance(failure, _lost()):
-            break
-    return _text(failure)
-
-
-def _lost():
-    from distributed import CancelledError, KilledWorker
-
-    return KilledWorker, CancelledError
 
 
 def _text(failure):
