@@ -54,41 +54,33 @@ def respond_command(
     response); with --limits `utilisations` (largest of every check, 1 is its limit) and `figure` (path). Of several
     tunnels these are of that with the gate, `tunnels` has the same of the others.
     """
-    with answering(json_path) as told:
+    with answering(json_path) as answer:
         from coupling.postprocess.summary import summarise_response
-        from coupling.responses.respond import (
-            chosen_file,
-            read_limits,
-            respond_by_name,
-            store_response,
-            with_checks,
-        )  # fmt: skip
+        from coupling.responses import respond as responses
         from coupling.responses.source import read_sources
 
         sources = read_sources(run, scene)
-        given = None if limits is None else read_limits(limits)
+        given = None if limits is None else responses.read_limits(limits)
         name = backend.rpartition(":")[2]
-        targets = [chosen_file(source, name, out, overwrite) for source in sources]
+        targets = [responses.chosen_file(source, name, out, overwrite) for source in sources]
         answers = []
         for source, target in zip(sources, targets, strict=True):
-            response = respond_by_name(source.ring, source.pressures, backend)
-            answer = summarise_response(response)
+            response = responses.respond_by_name(source.ring, source.pressures, backend)
+            found = summarise_response(response)
             if given is not None:
-                response, answer["utilisations"] = with_checks(response, given)
-            answer["file"] = str(store_response(response, source, name, target))
+                response, found["utilisations"] = responses.with_checks(response, given)
+            found["file"] = str(responses.store_response(response, source, name, target))
             if given is not None:
-                answer["figure"] = draw_checks(response, source.file, name, target, source.tunnel)
-            answers.append(answer)
+                found["figure"] = draw_checks(response, source.file, name, target, source.tunnel)
+            answers.append(found)
         data = {"run": str(run), "backend": name, **answers[0]}
         if len(sources) > 1:
-            data["tunnels"] = {source.tunnel: answer for source, answer in zip(sources[1:], answers[1:], strict=True)}
-        if told(data):
-            for source, answer in zip(sources, answers, strict=True):
-                Console().print(response_table(answer, source.tunnel))
+            data["tunnels"] = {source.tunnel: found for source, found in zip(sources[1:], answers[1:], strict=True)}
+        if answer(data):
+            for source, found in zip(sources, answers, strict=True):
+                Console().print(response_table(found, source.tunnel))
                 if given is not None:
-                    shares = ", ".join(
-                        f"{check.replace('_', ' ')} {share:.2f}" for check, share in answer["utilisations"].items()
-                    )
+                    shares = ", ".join(f"{k.replace('_', ' ')} {v:.2f}" for k, v in found["utilisations"].items())
                     say(f"largest of its limit: {shares}")
-                    say(f"picture in {answer['figure']}")
-                say(f"response in {answer['file']}")
+                    say(f"picture in {found['figure']}")
+                say(f"response in {found['file']}")

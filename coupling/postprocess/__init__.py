@@ -12,7 +12,7 @@ from coupling.postprocess.elements import (
     element_means,
     element_of_points,
     pore_pressure_steps,
-)  # fmt: skip
+)
 from coupling.postprocess.extremes import extremes
 from coupling.postprocess.flow_zone import Stages, flow_zone_stages
 from coupling.postprocess.ground_axes import arch, influence_distance, profile, stress_variation
@@ -25,7 +25,7 @@ from coupling.postprocess.inflow import (
     pressure_ratio,
     ratio_to_initial,
     with_inflow,
-)  # fmt: skip
+)
 from coupling.postprocess.settlement import share_within, surface_settlement, trough
 
 __all__ = [

@@ -19,7 +19,7 @@ from coupling.postprocess.quality import (
     quality_attributes,
     quality_line,
     stored_quality,
-)  # fmt: skip
+)
 from coupling.refused import Refused
 from coupling.responses.respond import responses_on
 from coupling.runs.memory import check_memory
