@@ -25,10 +25,7 @@ def store(comparison, source, out=None):
     dict
         models, times (count), cpu_seconds, rows, differences (path), responses (paths by model), figures (paths).
 
-    Raises
-    ------
-    Refused
-        The folder cannot be made, or holds other files under the names that are written.
+    Raises Refused: the folder cannot be made, or holds other files under the names that are written.
     """
     from coupling.datasets import write_dataset
     from coupling.figures import RESOLUTION

@@ -24,12 +24,8 @@ def describe(path: str | Path) -> dict[str, Any]:
     dict
         path; kind; bytes (of a file); facts: dict of texts and numbers; next: list of commands that take it.
 
-    Raises
-    ------
-    Refused
-        Nothing is there.
-    RunFileError, coupling.studies.design.StudyError
-        A netCDF file or a study that cannot be read.
+    Raises Refused: nothing is there; RunFileError, coupling.studies.design.StudyError: a netCDF file or a study that
+    cannot be read.
     """
     path = Path(path)
     if not path.exists():

@@ -30,12 +30,8 @@ def read_group_at_once(file, group=None, choose=None):
         Decoded by CF but for times. Variables that end early on an unlimited dimension are continued by their fill
         value.
 
-    Raises
-    ------
-    KeyError
-        No such group.
-    OSError, RuntimeError, ValueError, AttributeError
-        From the libraries, for a damaged file.
+    Raises KeyError: no such group; OSError, RuntimeError, ValueError, AttributeError: from the libraries, for a damaged
+    file.
     """
     variables = {}
     with _opened(file) as content:

@@ -25,12 +25,8 @@ def respond(scene: Scene, pressures: xr.Dataset, backend: str = "beam-spring", t
 
     tunnel : int or None, None: the one with the gate.
 
-    Raises
-    ------
-    Refused
-        No ring, no such model, or pressures or ring that the model does not take.
-    structure.LiningFailure
-        No equilibrium.
+    Raises Refused: no ring, no such model, or pressures or ring that the model does not take; structure.LiningFailure:
+    no equilibrium.
     """
     number = gate_tunnel(scene) if tunnel is None else tunnel
     pressures = on_tunnel(pressures, number)
@@ -52,10 +48,7 @@ def responses_on(
 def respond_by_name(ring: Ring, pressures: xr.Dataset, backend: str, **options: Any) -> xr.Dataset:
     """Response of a ring by the lining model of that name; `options` go to the model.
 
-    Raises
-    ------
-    Refused, structure.LiningFailure
-        As :func:`respond`.
+    Raises Refused, structure.LiningFailure: as :func:`respond`.
     """
     try:
         return at_whole_degrees(lining_model(backend)(ring, **options).respond(pressures))
@@ -66,10 +59,8 @@ def respond_by_name(ring: Ring, pressures: xr.Dataset, backend: str, **options: 
 def read_limits(path: Path) -> Limits:
     """The limits of a TOML file.
 
-    Raises
-    ------
-    Refused, structure.InputError
-        Not readable; or no TOML, or no limits: every mistake with key, rule, value and remedy.
+    Raises Refused, structure.InputError: not readable; or no TOML, or no limits: every mistake with key, rule, value
+    and remedy.
     """
     try:
         return Limits.from_toml(path)
@@ -80,10 +71,7 @@ def read_limits(path: Path) -> Limits:
 def with_checks(response: xr.Dataset, limits: Limits) -> tuple[xr.Dataset, dict[str, float]]:
     """The response with the variables of `structure.check`, and the largest value of every utilisation.
 
-    Raises
-    ------
-    Refused
-        The response lacks what a limit needs.
+    Raises Refused: the response lacks what a limit needs.
     """
     try:
         checked = check(response, limits)
@@ -98,10 +86,7 @@ def chosen_file(source: Source, model: str, out: Path | None = None, overwrite: 
     Without `out` that is the run where pressures and ring are its own, else `<file>-<model>.nc` beside the file. With
     the number of a tunnel without the gate, `-tunnel-<number>` stands before the ending.
 
-    Raises
-    ------
-    Refused
-        The file is there, or its folder is not; or it is the one that the pressures come from.
+    Raises Refused: the file is there, or its folder is not; or it is the one that the pressures come from.
     """
     if out is None and source.is_own:
         return None

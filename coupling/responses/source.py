@@ -46,12 +46,8 @@ def read_sources(path: str | Path, scene: str | None = None) -> list[Source]:
         Scene whose rings are taken. Left out: the scene stored with the run, or the attribute `ring` (JSON of a
         `structure.Ring`) of the file.
 
-    Raises
-    ------
-    RunFileError
-        Unreadable, not following the schema, or without a ring: which file, rule, value, remedy.
-    coupling.refused.SceneError
-        No such scene, or one whose rings do not fit its tunnels.
+    Raises RunFileError: unreadable, not following the schema, or without a ring: which file, rule, value, remedy;
+    coupling.refused.SceneError: no such scene, or one whose rings do not fit its tunnels.
     """
     file = run_file(path)
     with opened(file) as run:

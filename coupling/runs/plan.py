@@ -148,10 +148,7 @@ def rough_plan(
         stop_inflow_mass [kg/m], steps_to_stop_time, expected_time [s], expected_steps, records, memory_bytes,
         free_memory_bytes. Elements, points and dt are right within a factor of three where the mesh is regular.
 
-    Raises
-    ------
-    coupling.refused.Refused
-        Too little memory.
+    Raises coupling.refused.Refused: too little memory.
     """
     from mpm.solver import threads_used
     from mpm.threads import check_threads

@@ -37,10 +37,7 @@ def rerun(
     dict
         run, rerun (folders), changed (name to [then, now]), and the keys of :func:`compare_bits`.
 
-    Raises
-    ------
-    Refused, mpm.RunFailed, KeyboardInterrupt, OSError
-        As :func:`coupling.run`; and a run without a record.
+    Raises Refused, mpm.RunFailed, KeyboardInterrupt, OSError: as :func:`coupling.run`; and a run without a record.
     """
     file = run_file(first)
     attributes = read_attributes(file)

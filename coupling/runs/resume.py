@@ -34,10 +34,7 @@ def find_remains(folder, scene, warn):
     scene : None or a coupling.Scene, which must be that of the run;  warn : called with a message about each damaged
     file, which is set aside, while what came before it is used.
 
-    Raises
-    ------
-    Refused
-        Another scene, another version of what decides the result, or a run that would fail again.
+    Raises Refused: another scene, another version of what decides the result, or a run that would fail again.
     """
     file = folder / RUN_FILE
     attributes, records = None, 0

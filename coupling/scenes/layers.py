@@ -44,10 +44,7 @@ def scene_names() -> list[str]:
 def text_of(kind: str, name: str, room: str, error: type[SceneError] = SceneError) -> str:
     """TOML text of a "scene" or "study" that a room has built in, or of a file.
 
-    Raises
-    ------
-    SceneError
-        Neither, or as :func:`read_toml_file`.
+    Raises SceneError: neither, or as :func:`read_toml_file`.
     """
     names = scene_names() if room == "scenes" else ready_names(room)
     if name in names:
@@ -65,10 +62,7 @@ def text_of(kind: str, name: str, room: str, error: type[SceneError] = SceneErro
 def read_scene_data(name: str | Path) -> dict[str, Any]:
     """The nested dictionary of a scene, its bases merged, before validation; for :func:`make_scene`.
 
-    Raises
-    ------
-    SceneError
-        Unknown name or unreadable file.
+    Raises SceneError: unknown name or unreadable file.
     """
     return merged(layers_of(str(name), ()))
 
@@ -76,10 +70,7 @@ def read_scene_data(name: str | Path) -> dict[str, Any]:
 def parse_changes(texts: list[str]) -> dict[str, Any]:
     """Changes for :func:`load_scene` from texts as "gate.angle=45", "gate.width=20 cm" or "water=none".
 
-    Raises
-    ------
-    SceneError
-        A text without a name or a value.
+    Raises SceneError: a text without a name or a value.
     """
     found = {}
     for text in texts:
@@ -112,10 +103,7 @@ def change_layers(changes: dict[str, Any]) -> list[Layer]:
 def changed(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     """The nested dictionary of a scene with that of some changes merged into it, see the module's description.
 
-    Raises
-    ------
-    SceneError
-        A list is asked for an entry that it does not have.
+    Raises SceneError: a list is asked for an entry that it does not have.
     """
     merged = dict(base)
     for key, value in changes.items():
@@ -200,10 +188,7 @@ def _is_there(path: Path) -> bool:
 def parse_toml(text: str, who: str) -> dict[str, Any]:
     """Nested dictionary of a TOML text.
 
-    Raises
-    ------
-    SceneError
-        Not valid TOML, with the line, or nested more deeply than any scene.
+    Raises SceneError: not valid TOML, with the line, or nested more deeply than any scene.
     """
     try:
         data = tomllib.loads(text)
@@ -231,10 +216,7 @@ def check_levels(data: Any, who: str) -> None:
 def read_toml_file(path: Path, who: str) -> str:
     """Text of a file that is meant to be TOML.
 
-    Raises
-    ------
-    SceneError
-        No regular file (a device or a pipe may never end), longer than 1 MB, unreadable, or no text.
+    Raises SceneError: no regular file (a device or a pipe may never end), longer than 1 MB, unreadable, or no text.
     """
     try:
         if not path.is_file():

@@ -52,10 +52,7 @@ def ring_in_si(ring: dict[str, Any], home: str = "") -> tuple[dict[str, Any], li
 def ring_number(name: str, value: Any) -> Any:
     """A value of [ring] as a number in its unit; `name` as "ground.cohesion".
 
-    Raises
-    ------
-    ValueError
-        As :func:`mpm.scene.quantity_in`.
+    Raises ValueError: as :func:`mpm.scene.quantity_in`.
     """
     unit = UNITS.get(name)
     if unit is None:
@@ -87,10 +84,7 @@ def ring_of(scene: Scene, tunnel: int) -> Ring:
     """The ring of a tunnel: that of the scene for the tunnel with the gate (else the first), the same concrete and
     joints with the tunnel's own diameters and the ground at its own axis for any other.
 
-    Raises
-    ------
-    SceneError
-        No ring, or joints that the other diameters do not take.
+    Raises SceneError: no ring, or joints that the other diameters do not take.
     """
     if scene.ring is None:
         raise SceneError(f"scene '{scene.name}': has no [ring]; add one to get internal forces")

@@ -157,10 +157,7 @@ def as_scene(scene: Any) -> Scene:
 
     An `mpm.Scene` is a scene without a ring.
 
-    Raises
-    ------
-    SceneError
-        As :func:`load_scene`; or what is given is neither.
+    Raises SceneError: as :func:`load_scene`; or what is given is neither.
     """
     if isinstance(scene, str | Path):
         return load_scene(scene)
@@ -178,10 +175,7 @@ def as_scene(scene: Any) -> Scene:
 def parse_scene(text: str, origin: str) -> Scene:
     """A scene from the complete TOML text that a run stores.
 
-    Raises
-    ------
-    SceneError
-        As :func:`load_scene`.
+    Raises SceneError: as :func:`load_scene`.
     """
     layer = Layer(origin, text, parse_toml(text, f"scene {origin!r}"))
     return make_scene(layer.data, origin, (layer,))
@@ -253,10 +247,7 @@ def make_scene(data: dict[str, Any], origin: str = "scene", layers: tuple[Layer,
 def number_in_unit(name: str, value: Any) -> Any:
     """A string with a unit as the number that the key of that dotted name takes; anything else as it is.
 
-    Raises
-    ------
-    ValueError
-        As :func:`mpm.scene.quantity_in`.
+    Raises ValueError: as :func:`mpm.scene.quantity_in`.
     """
     if name.startswith("ring."):
         return ring_number(".".join(_without_numbers(name)[1:]), value)

@@ -29,10 +29,8 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, 
     threads : int
         Results do not depend on it.
 
-    Raises
-    ------
-    mpm.RunFailed, structure.LiningFailure, coupling.refused.Refused
-        As :func:`coupling.run`; the study goes on without the case.
+    Raises mpm.RunFailed, structure.LiningFailure, coupling.refused.Refused: as :func:`coupling.run`; the study goes on
+    without the case.
     """
     from coupling.datasets import read_history, read_pressures, write_dataset, write_responses
     from coupling.datasets.geometry import on_tunnel

@@ -29,10 +29,7 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
         (case) "finished" or "failed", `message` (case). Attributes: `study`, its definition as JSON with the seed;
         `failed`, their number; source, revision, versions.
 
-    Raises
-    ------
-    coupling.studies.design.StudyError
-        The file of a case is damaged.
+    Raises coupling.studies.design.StudyError: the file of a case is damaged.
     """
     there = [case for case in cases if case_file(folder, case).is_file()]
     parts, files = [], [case_file(folder, case) for case in there]
@@ -118,10 +115,7 @@ def _of_scenes(cases):
 def stored_cases(folder: str | Path) -> tuple[Study, list[Case], dict[str, str]]:
     """Definition, cases and failures of a study that ran earlier, also by an earlier version of the program.
 
-    Raises
-    ------
-    coupling.studies.design.StudyError
-        No study there, or its files are damaged.
+    Raises coupling.studies.design.StudyError: no study there, or its files are damaged.
     """
     folder = Path(folder)
     plan = stored_study(folder)

@@ -190,10 +190,7 @@ def value_text(value: Any) -> str:
 def load_study(study: str | Path | dict | Study) -> Study:
     """A study from a built-in name, a TOML file, the folder of one that ran, a nested dictionary, or as it is.
 
-    Raises
-    ------
-    StudyError
-        Unknown name, unreadable file, or invalid values; every mistake found is named.
+    Raises StudyError: unknown name, unreadable file, or invalid values; every mistake found is named.
     """
     if isinstance(study, Study):
         return study
@@ -230,10 +227,7 @@ def is_folder(study: object) -> bool:
 def stored_study(folder: str | Path) -> Study:
     """The definition of a study that ran earlier, from its folder.
 
-    Raises
-    ------
-    StudyError
-        No study there, or its file is damaged.
+    Raises StudyError: no study there, or its file is damaged.
     """
     try:
         return load_study(json.loads((Path(folder) / STUDY_FILE).read_text(encoding="utf-8")))
@@ -251,10 +245,7 @@ def study_names() -> list[str]:
 def cases(study: Study) -> list[Case]:
     """All cases of a study, validated before any of them runs.
 
-    Raises
-    ------
-    StudyError
-        A parameter that the scene does not have, or values that it refuses; the case is named.
+    Raises StudyError: a parameter that the scene does not have, or values that it refuses; the case is named.
     """
     found: dict[str, Case] = {}
     for number, changes in enumerate(study.combinations()):
@@ -295,10 +286,7 @@ def _in_unit(name, value):
 def check_backends(study: Study):
     """Refuse lining models that are not there before anything runs; a study that ran is read without them.
 
-    Raises
-    ------
-    StudyError
-        An unknown model, or the same one twice.
+    Raises StudyError: an unknown model, or the same one twice.
     """
     from structure.models import lining_model, lining_model_names, model_name
 

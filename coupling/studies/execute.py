@@ -216,10 +216,8 @@ def _submitted(client, plan, todo, folder, at_once):
 def _wait(client, pool):
     """Until a case has ended.
 
-    Raises
-    ------
-    StudyError
-        When no worker has been there for a while: a case that was given to none would be waited for in vain.
+    Raises StudyError: when no worker has been there for a while: a case that was given to none would be waited for in
+    vain.
     """
     seen = clock.monotonic()
     while not pool.has_ready():
