@@ -86,7 +86,7 @@ def _of_scene(scene, threads, elements, asked):
     }
 
 
-def _checked(scene, warn):
+def _checked(scene: Scene | str | Path, warn: Callable[[str], None] | None) -> Scene:
     """A valid scene that fits into the memory, what is unusual in it told."""
     scene = as_scene(scene)
     for warning in warnings_of(scene):

@@ -91,9 +91,9 @@ def study(
         except KeyboardInterrupt as stop:
             stop.add_note(f"what is done is kept; go on with: gush study {folder}")
             raise
-    outcome = {key: {"status": "failed", "message": message} for key, message in failures.items()}
+    failed = {key: {"status": "failed", "message": message} for key, message in failures.items()}
     finished = {"status": "finished", "message": ""}
-    status = {case.key: {"parameters": case.parameters, **outcome.get(case.key, finished)} for case in todo}
+    status = {case.key: {"parameters": case.parameters, **failed.get(case.key, finished)} for case in todo}
     _write_json(folder / STATUS_FILE, status)
     from coupling.studies.collect import collect  # by now loaded beside the workers
 
