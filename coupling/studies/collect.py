@@ -10,7 +10,8 @@ import xarray as xr
 from coupling.datasets.group import read_group_at_once
 from coupling.files.provenance import origin, with_history
 from coupling.scenes.scene import unit_of
-from coupling.studies.design import Case, Study, StudyError, cases, stored_study
+from coupling.studies.cases import Case, cases
+from coupling.studies.design import Study, StudyError, stored_study
 from coupling.studies.folder import STATUS_FILE, case_file
 from structure.lining import at_whole_degrees
 

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from coupling.files.replace import replace_file
 from coupling.studies.case import run_case
-from coupling.studies.design import Study, StudyError, cases, check_backends, is_folder, load_study
+from coupling.studies.cases import cases, check_backends
+from coupling.studies.design import Study, StudyError, is_folder, load_study
 from coupling.studies.folder import CASES, STATUS_FILE, STUDY_FILE, case_file
 from coupling.studies.progress import StudyState, watching
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from coupling.studies.design import Case
+    from coupling.studies.cases import Case
 
 STUDY_FILE, STATUS_FILE, DATA_FILE, CASES = "study.json", "status.json", "study.nc", "cases"
 #: In a case's folder: what of it goes into the study's dataset, written last, so it exists only when all is done.
