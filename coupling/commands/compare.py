@@ -7,7 +7,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from coupling.commands.exit_codes import JsonPath, checked_json, failures, told_warnings, write_json
+from coupling.commands.exit_codes import JsonPath, answering, say
 from coupling.commands.options import SOURCE, RingScene
 from coupling.refused import Refused
 
@@ -17,23 +17,15 @@ FOLDER, DIFFERENCES = "comparison", "differences.nc"
 def store(comparison, source, out=None):
     """Write differences, both responses and figures into a folder; returns what a table or JSON needs.
 
-    Parameters
-    ----------
-    comparison : Comparison
-    source : coupling.responses.source.Source
-    out : path, optional
-        `comparison/` beside the file when left out; only files of an earlier comparison are replaced. Tunnels without
-        the gate have folders of their own in it.
+    Without `out` the folder is `comparison/` beside the file; only files of an earlier comparison are replaced. Tunnels
+    without the gate have folders of their own in it.
 
     Returns
     -------
     dict
         models, times (count), cpu_seconds, rows, differences (path), responses (paths by model), figures (paths).
 
-    Raises
-    ------
-    Refused
-        The folder cannot be made, or holds other files under the names that are written.
+    Raises Refused: the folder cannot be made, or holds other files under the names that are written.
     """
     from coupling.datasets import write_dataset
     from coupling.figures import RESOLUTION
@@ -101,8 +93,7 @@ def compare_command(
     Nothing in RUN changes. JSON: `run`, `models`, `cpu_seconds`, `rows` (see `coupling.responses.comparison.compare`),
     `differences`, `responses`, `figures` (paths); of several tunnels that with the gate, the others under `tunnels`.
     """
-    with failures(), checked_json(json_path), told_warnings():
-        from coupling.commands.compare import store
+    with answering(json_path) as answer:
         from coupling.responses.comparison import compare
         from coupling.responses.source import read_sources
 
@@ -113,14 +104,12 @@ def compare_command(
             found[source.tunnel] = store(comparison, source, out)
         others = {tunnel: one for tunnel, one in found.items() if tunnel is not None}
         data = {"run": str(run), **found[None], **({"tunnels": others} if others else {})}
-        write_json(json_path, data)
-        if str(json_path) != "-":
-            console = Console()
+        if answer(data):
             for tunnel, one in found.items():
-                console.print(_comparison_table(one, tunnel))
+                Console().print(_comparison_table(one, tunnel))
                 times = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in one["cpu_seconds"].items())
-                console.print(f"CPU time for {one['times']} times: {times}", highlight=False)
-                console.print(f"results in {Path(one['differences']).parent}", highlight=False, soft_wrap=True)
+                say(f"CPU time for {one['times']} times: {times}")
+                say(f"results in {Path(one['differences']).parent}")
 
 
 def _comparison_table(data, tunnel=None):

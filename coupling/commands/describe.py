@@ -10,30 +10,22 @@ from typing import Any
 from coupling.datasets import RunFileError, opened, read_attributes, read_history
 from coupling.files.folder import RUN_FILE, how_to_go_on
 from coupling.files.own_content import require_own_content
-from coupling.refused import Refused
-from coupling.studies.execute import STUDY_FILE
+from coupling.refused import Refused, SceneError
+from coupling.studies.folder import STUDY_FILE, case_file
 
-SIGNATURES = {b"\x89HDF\r\n\x1a\n": "netcdf", b"\x89PNG\r\n\x1a\n": "png", b"GIF8": "gif", b"CDF": "netcdf3"}
+SIGNATURES = {b"\x89HDF\r\n\x1a\n": "netcdf", b"\x89PNG\r\n\x1a\n": "picture (PNG)", b"GIF8": "picture (GIF)"}
 
 
 def describe(path: str | Path) -> dict[str, Any]:
     """What a path is.
-
-    Parameters
-    ----------
-    path : str or path
 
     Returns
     -------
     dict
         path; kind; bytes (of a file); facts: dict of texts and numbers; next: list of commands that take it.
 
-    Raises
-    ------
-    Refused
-        Nothing is there.
-    RunFileError, coupling.studies.design.StudyError
-        A netCDF file or a study that cannot be read.
+    Raises Refused: nothing is there; RunFileError, coupling.studies.design.StudyError: a netCDF file or a study that
+    cannot be read.
     """
     path = Path(path)
     if not path.exists():
@@ -59,7 +51,6 @@ def _folder(path):
 
 def _study(path):
     from coupling.studies.collect import stored_cases
-    from coupling.studies.execute import case_file
 
     plan, cases, failures = stored_cases(path)
     finished = sum(case_file(path, case).is_file() for case in cases)
@@ -79,11 +70,11 @@ def _study(path):
 def _file(path):
     with open(path, "rb") as stream:
         start = stream.read(1000)
-    kind = next((name for signature, name in SIGNATURES.items() if start.startswith(signature)), None)
+    kind = next((name for signature, name in SIGNATURES.items() if start.startswith(signature)), "")
     if kind == "netcdf":
         return _netcdf(path)
-    if kind in ("png", "gif"):
-        return {"kind": f"picture ({kind.upper()})"}
+    if kind:
+        return {"kind": kind}
     if b"gushing report" in start:
         return {"kind": "report of a run or a study", "next": ["open it in a browser"]}
     if b"<VTKFile" in start or b"<Xdmf" in start:
@@ -147,7 +138,7 @@ def _run_commands(path, facts):
 
 
 def _scene(path):
-    from coupling.refused import SceneError
+    from coupling.scenes.features import facts as scene_facts
     from coupling.scenes.scene import load_scene
 
     try:
@@ -158,18 +149,8 @@ def _scene(path):
         except (tomllib.TOMLDecodeError, UnicodeDecodeError):
             return {"kind": "not a file of this program", "facts": {"why": "no valid TOML"}}
         return {"kind": "TOML file that is no valid scene", "facts": {"why": str(error)}}
-    tunnels = ", ".join(f"{t.outer_diameter:g} m under {t.cover:g} m" for t in scene.tunnels)
-    gate = scene.gate
-    return {
-        "kind": "scene",
-        "facts": {
-            "name": scene.name,
-            "soils": ", ".join(soil.name for soil in scene.soils),
-            "tunnels": tunnels or "none",
-            "gate": "none" if gate is None else f"{gate.width:g} m at {gate.angle:g} degrees",
-        },
-        "next": [f"gush plan {path}", f"gush run {path}"],
-    }
+    facts = {"name": scene.name, **dict(scene_facts(scene))}
+    return {"kind": "scene", "facts": facts, "next": [f"gush plan {path}", f"gush run {path}"]}
 
 
 def _json(path):

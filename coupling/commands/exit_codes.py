@@ -49,6 +49,22 @@ def exit_code(error):
 
 
 @contextlib.contextmanager
+def answering(json_path):
+    """A command from its checks to its result: what goes wrong becomes a message and an exit code.
+
+    Gives a function that takes the result, writes it as JSON where that is asked for, and says whether to print it for
+    people, too.
+    """
+
+    def answer(data):
+        write_json(json_path, data)
+        return str(json_path) != "-"
+
+    with failures(), checked_json(json_path), told_warnings():
+        yield answer
+
+
+@contextlib.contextmanager
 def checked_json(path):
     """Refuse a --json path before the work instead of after it."""
     if path is not None and str(path) != "-":
@@ -105,9 +121,6 @@ def warn(message):
     Console(stderr=True).print(text, style="yellow", markup=False, highlight=False, soft_wrap=True)
 
 
-def tell_files(data, json_path, files):
-    """Write a result as JSON, and print the files that were made."""
-    write_json(json_path, data)
-    if str(json_path) != "-":
-        for path in files:
-            Console().print(f"wrote {path}", highlight=False, soft_wrap=True, markup=False)
+def say(text):
+    """Print a line of a result."""
+    Console().print(text, highlight=False, soft_wrap=True, markup=False)

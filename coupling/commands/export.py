@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from coupling.commands.exit_codes import JsonPath, checked_json, failures, tell_files
+from coupling.commands.exit_codes import JsonPath, answering, say
 from coupling.commands.options import Run
 
 
@@ -19,8 +19,10 @@ def export_command(
 
     JSON: `run`, `format`, `files` (paths to open).
     """
-    with failures(), checked_json(json_path):
+    with answering(json_path) as answer:
         from coupling.export import export
 
         files = export(run, kind, out)
-        tell_files({"run": str(run), "format": kind, "files": [str(path) for path in files]}, json_path, files)
+        if answer({"run": str(run), "format": kind, "files": [str(path) for path in files]}):
+            for path in files:
+                say(f"wrote {path}")

@@ -7,7 +7,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from coupling.commands.exit_codes import JsonPath, checked_json, failures, plain, write_json
+from coupling.commands.exit_codes import JsonPath, answering, plain, say
 
 
 def info_command(
@@ -18,14 +18,13 @@ def info_command(
 
     JSON: keys of `coupling.commands.describe.describe`.
     """
-    with failures(), checked_json(json_path):
+    with answering(json_path) as answer:
         from coupling.commands.describe import describe
 
         data = describe(path)
-        write_json(json_path, data)
-        if str(json_path) != "-":
-            console, table = Console(), Table("what", "")
-            console.print(plain(f"{data['path']}: {data['kind']}"), highlight=False, soft_wrap=True, markup=False)
+        if answer(data):
+            table = Table("what", "")
+            say(plain(f"{data['path']}: {data['kind']}"))
             if "bytes" in data:
                 size = data["bytes"]
                 table.add_row("size", f"{size} bytes" if size < 1e5 else f"{size / 1e6:.3g} MB")
@@ -34,4 +33,4 @@ def info_command(
                 table.add_row(name.replace("[", "\\["), shown.replace("[", "\\["))
             for command in data["next"]:
                 table.add_row("next", plain(command).replace("[", "\\["))
-            console.print(table)
+            Console().print(table)

@@ -15,4 +15,5 @@ Changes = Annotated[
     typer.Option("--set", help="Change one value of the scene: gate.angle=45, 'gate.width=20 cm'; may be repeated."),
 ]
 Threads = Annotated[int | None, typer.Option(min=1, help="Threads; all cores when left out. Does not change results.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Print errors only.")]
 Run = Annotated[Path, typer.Argument(help="Folder (or run.nc) of a run, also one that goes on.")]

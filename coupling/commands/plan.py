@@ -6,7 +6,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from coupling.commands.exit_codes import JsonPath, checked_json, failures, warn, write_json
+from coupling.commands.exit_codes import JsonPath, answering, warn
 from coupling.commands.options import Changes, SceneName, Threads
 from coupling.runs.progress_line import duration
 
@@ -22,7 +22,7 @@ def plan_command(
 
     JSON: keys of `coupling.runs.plan.plan`, with --rough of `coupling.runs.plan.rough_plan`; and `warnings`.
     """
-    with failures(), checked_json(json_path):
+    with answering(json_path) as answer:
         from coupling.runs.plan import plan, rough_plan
         from coupling.scenes.layers import parse_changes
         from coupling.scenes.scene import load_scene
@@ -34,11 +34,8 @@ def plan_command(
             warn(message)
 
         data = {**(rough_plan if rough else plan)(loaded, threads, tell), "warnings": told}
-        write_json(json_path, data)
-        if str(json_path) != "-":
-            console = Console()
-            console.print(_feature_table(data))
-            console.print(_cost_table(data))
+        if answer(data):
+            Console().print(_feature_table(data), _cost_table(data), sep="\n")
 
 
 def _feature_table(data):

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from coupling.commands.exit_codes import JsonPath, checked_json, failures, tell_files
+from coupling.commands.exit_codes import JsonPath, answering, say
 
 
 def report_command(
@@ -21,7 +21,7 @@ def report_command(
 
     JSON: `run` or `study` (path), `report` (path), `bytes`; `runs` (paths) with --runs.
     """
-    with failures(), checked_json(json_path):
+    with answering(json_path) as answer:
         from coupling.refused import Refused
         from coupling.report.page import study_folder, write_report, write_run_reports
 
@@ -33,4 +33,6 @@ def report_command(
         data = {"run" if folder is None else "study": str(path), "report": str(page), "bytes": page.stat().st_size}
         if runs:
             data["runs"] = [str(file) for file in of_runs]
-        tell_files(data, json_path, [*of_runs, page])
+        if answer(data):
+            for file in [*of_runs, page]:
+                say(f"wrote {file}")

@@ -4,10 +4,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
-from coupling.commands.exit_codes import DIFFERENT, JsonPath, checked_json, failures, warn, write_json
-from coupling.commands.options import Threads
+from coupling.commands.exit_codes import DIFFERENT, JsonPath, answering, say, warn
+from coupling.commands.options import Quiet, Threads
 from coupling.runs.progress_line import ProgressLine
 
 
@@ -18,24 +17,22 @@ def rerun_command(
     ] = None,
     threads: Threads = None,
     json_path: JsonPath = None,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Print errors only.")] = False,
+    quiet: Quiet = False,
 ):
     """Repeat a run from what its file says and compare all records bit for bit; exit code 1 when they differ.
 
     JSON: keys of `coupling.runs.rerun.rerun`.
     """
-    with failures(), checked_json(json_path):
+    with answering(json_path) as answer:
         from coupling.runs.rerun import rerun
 
         with ProgressLine(quiet) as line:
             data = rerun(run, out, line, threads, warn)
-        write_json(json_path, data)
-        if not quiet and str(json_path) != "-":
-            tell = Console().print
+        if answer(data) and not quiet:
             for row in data["differences"]:
-                tell(f"{row['variable']}: first at t {row['time']} s, by at most {row['largest']}", highlight=False)
+                say(f"{row['variable']}: first at t {row['time']} s, by at most {row['largest']}")
             of = f" of {data['records_run']}" if data["records"] < data["records_run"] else ""
             verdict = "identical bit for bit" if data["identical"] else "different"
-            tell(f"{verdict}: {data['records']}{of} records of {run} and {data['rerun']}", soft_wrap=True)
+            say(f"{verdict}: {data['records']}{of} records of {run} and {data['rerun']}")
     if not data["identical"]:
         raise typer.Exit(DIFFERENT)

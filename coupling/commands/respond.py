@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from coupling.commands.exit_codes import JsonPath, checked_json, failures, told_warnings, write_json
+from coupling.commands.exit_codes import JsonPath, answering, say
 from coupling.commands.options import SOURCE, RingScene
 from coupling.commands.tables import response_table
 
@@ -14,8 +14,7 @@ from coupling.commands.tables import response_table
 def draw_checks(checked, file, model, own_file=None, tunnel=None):
     """Draw the checks beside a run's figures, or beside the response's own file and named after it; returns the path.
 
-    file : path, of the run;  own_file : path or None, from :func:`coupling.responses.stored.chosen_file`;  tunnel : int
-    or None, of those without the gate.
+    file : of the run;  own_file : from :func:`coupling.responses.respond.chosen_file`;  tunnel : without the gate.
     """
     from coupling.figures import RESOLUTION
     from coupling.figures.utilisations import checks
@@ -55,40 +54,33 @@ def respond_command(
     response); with --limits `utilisations` (largest of every check, 1 is its limit) and `figure` (path). Of several
     tunnels these are of that with the gate, `tunnels` has the same of the others.
     """
-    with failures(), checked_json(json_path), told_warnings():
-        from coupling.commands.respond import draw_checks
+    with answering(json_path) as answer:
         from coupling.postprocess.summary import summarise_response
-        from coupling.responses.limits import read_limits, with_checks
-        from coupling.responses.respond import respond_by_name
+        from coupling.responses import respond as responses
         from coupling.responses.source import read_sources
-        from coupling.responses.stored import chosen_file, store_response
 
         sources = read_sources(run, scene)
-        given = None if limits is None else read_limits(limits)
+        given = None if limits is None else responses.read_limits(limits)
         name = backend.rpartition(":")[2]
-        targets = [chosen_file(source, name, out, overwrite) for source in sources]
+        targets = [responses.chosen_file(source, name, out, overwrite) for source in sources]
         answers = []
         for source, target in zip(sources, targets, strict=True):
-            response = respond_by_name(source.ring, source.pressures, backend)
-            answer = summarise_response(response)
+            response = responses.respond_by_name(source.ring, source.pressures, backend)
+            found = summarise_response(response)
             if given is not None:
-                response, answer["utilisations"] = with_checks(response, given)
-            answer["file"] = str(store_response(response, source, name, target))
+                response, found["utilisations"] = responses.with_checks(response, given)
+            found["file"] = str(responses.store_response(response, source, name, target))
             if given is not None:
-                answer["figure"] = draw_checks(response, source.file, name, target, source.tunnel)
-            answers.append(answer)
+                found["figure"] = draw_checks(response, source.file, name, target, source.tunnel)
+            answers.append(found)
         data = {"run": str(run), "backend": name, **answers[0]}
         if len(sources) > 1:
-            data["tunnels"] = {source.tunnel: answer for source, answer in zip(sources[1:], answers[1:], strict=True)}
-        write_json(json_path, data)
-        if str(json_path) != "-":
-            console = Console()
-            for source, answer in zip(sources, answers, strict=True):
-                console.print(response_table(answer, source.tunnel))
+            data["tunnels"] = {source.tunnel: found for source, found in zip(sources[1:], answers[1:], strict=True)}
+        if answer(data):
+            for source, found in zip(sources, answers, strict=True):
+                Console().print(response_table(found, source.tunnel))
                 if given is not None:
-                    shares = ", ".join(
-                        f"{check.replace('_', ' ')} {share:.2f}" for check, share in answer["utilisations"].items()
-                    )
-                    console.print(f"largest of its limit: {shares}", highlight=False)
-                    console.print(f"picture in {answer['figure']}", highlight=False, soft_wrap=True)
-                console.print(f"response in {answer['file']}", highlight=False, soft_wrap=True)
+                    shares = ", ".join(f"{k.replace('_', ' ')} {v:.2f}" for k, v in found["utilisations"].items())
+                    say(f"largest of its limit: {shares}")
+                    say(f"picture in {found['figure']}")
+                say(f"response in {found['file']}")

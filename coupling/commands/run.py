@@ -9,8 +9,8 @@ from rich.console import Console
 from rich.table import Table
 
 from coupling.commands.events import EventStream
-from coupling.commands.exit_codes import JsonPath, checked_json, failures, told_warnings, warn, write_json
-from coupling.commands.options import Changes, Threads
+from coupling.commands.exit_codes import JsonPath, answering, checked_json, say, warn
+from coupling.commands.options import Changes, Quiet, Threads
 from coupling.commands.tables import response_table
 from coupling.runs.progress_line import ProgressLine
 
@@ -35,7 +35,7 @@ def run_command(
     events: Annotated[
         Path | None, typer.Option("--events", help="Also write what happens as JSON lines while it does; - prints.")
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Print errors only.")] = False,
+    quiet: Quiet = False,
 ):
     """Open the gate of a scene and compute inflow, lining pressures and ring forces.
 
@@ -43,7 +43,7 @@ def run_command(
     (keys of `coupling.postprocess.summary.summarise_response`, or null). Events:
     see `coupling.commands.events.EventStream`.
     """
-    with failures(), checked_json(json_path), checked_json(events), EventStream(events) as stream, told_warnings():
+    with answering(json_path) as answer, checked_json(events), EventStream(events) as stream:
         from coupling.datasets import RunFileError, opened, read_response
         from coupling.files.folder import FIGURES
         from coupling.postprocess.quality import quality_line, states_line, verdicts
@@ -71,19 +71,16 @@ def run_command(
                 for tunnel, one in data["tunnels"].items():
                     one["response"] = summarise_response(read_response(file, tunnel=tunnel))
         data["figures"] = sorted(str(path) for path in (folder / FIGURES).glob("*.png"))
-        write_json(json_path, data)
+        printed = answer(data) and not quiet and not stream.printing
         stream.tell("result", **data)
-        if not quiet and str(json_path) != "-" and not stream.printing:
-            console = Console()
-            console.print(_run_table(data))
-            if data["response"]:
-                console.print(response_table(data["response"]))
-            for tunnel, one in data["tunnels"].items():
+        if printed:
+            Console().print(_run_table(data))
+            for tunnel, one in {None: data, **data["tunnels"]}.items():
                 if one["response"]:
-                    console.print(response_table(one["response"], tunnel))
-            console.print(f"errors: {quality_line(data['quality'])}", highlight=False)
-            console.print(f"states of the points, no errors: {states_line(data['quality'])}", highlight=False)
-            console.print(f"results in {folder}", highlight=False, soft_wrap=True)
+                    Console().print(response_table(one["response"], tunnel))
+            say(f"errors: {quality_line(data['quality'])}")
+            say(f"states of the points, no errors: {states_line(data['quality'])}")
+            say(f"results in {folder}")
 
 
 def _run_table(data):

@@ -3,7 +3,7 @@
 from rich.console import Console
 from rich.table import Table
 
-from coupling.commands.exit_codes import JsonPath, checked_json, failures, write_json
+from coupling.commands.exit_codes import JsonPath, answering
 
 
 def scenes_command(json_path: JsonPath = None):
@@ -12,13 +12,12 @@ def scenes_command(json_path: JsonPath = None):
     JSON: `scenes`, a list of {name, soil, cover [m], gate_angle [degree], gate_width [m], tunnels, stop_time [s],
     stop_inflow_mass [kg/m]}.
     """
-    with failures(), checked_json(json_path):
+    with answering(json_path) as answer:
         from coupling.scenes.layers import scene_names
         from coupling.scenes.scene import load_scene
 
         data = {"scenes": [_scene_row(load_scene(name)) for name in scene_names()]}
-        write_json(json_path, data)
-        if str(json_path) != "-":
+        if answer(data):
             table = Table("scene", "soil", "cover", "gate", "tunnels", "until")
             for row in data["scenes"]:
                 until = [f"{row['stop_inflow_mass']:g} kg/m"] if row["stop_inflow_mass"] else []

@@ -7,7 +7,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from coupling.commands.exit_codes import FAILED, JsonPath, checked_json, failures, write_json
+from coupling.commands.exit_codes import FAILED, JsonPath, answering, say
 from structure.response import SHOWN
 
 
@@ -31,15 +31,13 @@ def study_command(
 
     JSON: keys of `coupling.studies.stored.run_study`.
     """
-    with failures(), checked_json(json_path):
+    with answering(json_path) as answer:
         from coupling.studies.stored import run_study
 
         data = run_study(study, out, workers, scheduler, Console(stderr=True))
-        write_json(json_path, data)
-        if str(json_path) != "-":
-            console = Console()
-            console.print(_study_table(data))
-            console.print(f"data: {data['data']}", highlight=False, soft_wrap=True)
+        if answer(data):
+            Console().print(_study_table(data))
+            say(f"data: {data['data']}")
         if any(case["status"] == "failed" for case in data["cases"]):
             raise typer.Exit(FAILED)
 

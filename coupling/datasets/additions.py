@@ -1,25 +1,20 @@
 """What is added to a run file that is there: attributes and responses; and datasets as files of their own."""
 
-from __future__ import annotations
-
 import contextlib
 import shutil
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import h5netcdf
+import h5py
+import xarray as xr
 
 from coupling.datasets.damage import damage_told
 from coupling.datasets.schema import structure_group
 from coupling.files.journal import changed, recover
 from coupling.files.provenance import with_history
 from coupling.files.replace import replaced
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    import h5netcdf
-    import h5py
-    import xarray as xr
-
 
 #: HDF5 format with checksums on its structure, read by netCDF-C too; those of the data are asked for by each variable.
 CHECKED_FORMAT = ("v110", "v110")
@@ -45,9 +40,6 @@ def write_responses(
     path: str | Path, responses: Mapping[tuple[str, int | None], xr.Dataset], **attributes: Any
 ) -> None:
     """Write responses by lining model and tunnel, and root attributes with them, as a whole: all of them or none."""
-    import h5netcdf
-    import h5py
-
     path = Path(path).resolve()
     recover(path)
     with replaced(path) as beside, damage_told(path, writing=True):
@@ -66,8 +58,6 @@ def write_responses(
 
 def write_dataset(path: str | Path, dataset: xr.Dataset) -> None:
     """Write a dataset with checksums into a file of its own."""
-    import h5netcdf
-
     with h5netcdf.File(path, "w", libver=CHECKED_FORMAT) as file:
         _dump(dataset, file, None)
 
@@ -90,9 +80,6 @@ def _dump(dataset, file, group):
 @contextlib.contextmanager
 def append_to(path: str | Path) -> Iterator[tuple[h5netcdf.File, h5py.File]]:
     """The run file, open for changes that happen as a whole, and the HDF5 file that it is, to read what it holds."""
-    import h5netcdf
-    import h5py
-
     with (
         damage_told(path, writing=True),
         changed(path) as whole,

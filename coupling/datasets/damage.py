@@ -1,7 +1,5 @@
 """What is wrong with a run file that cannot be used, in words."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 from pathlib import Path

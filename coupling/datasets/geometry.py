@@ -1,16 +1,12 @@
 """Tunnels and gate of a run: as attributes of its datasets, and read from them again."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    import xarray as xr
-    from numpy.typing import NDArray
-
-    from mpm.scene import Scene as MpmScene
+from mpm.scene import Scene as MpmScene
 
 NAMES = ("tunnel_x", "tunnel_axis_depth", "tunnel_outer_radius", "tunnel_inner_radius")
 

@@ -6,7 +6,10 @@ opening a group of n variables through xarray takes n² look-ups: seconds for th
 
 import contextlib
 
+import h5netcdf
+import h5py
 import numpy as np
+import xarray as xr
 
 
 def read_group_at_once(file, group=None, choose=None):
@@ -27,15 +30,9 @@ def read_group_at_once(file, group=None, choose=None):
         Decoded by CF but for times. Variables that end early on an unlimited dimension are continued by their fill
         value.
 
-    Raises
-    ------
-    KeyError
-        No such group.
-    OSError, RuntimeError, ValueError, AttributeError
-        From the libraries, for a damaged file.
+    Raises KeyError: no such group; OSError, RuntimeError, ValueError, AttributeError: from the libraries, for a damaged
+    file.
     """
-    import xarray as xr
-
     variables = {}
     with _opened(file) as content:
         attributes, declared, lengths = _declared(content, group)
@@ -53,15 +50,11 @@ def read_group_at_once(file, group=None, choose=None):
 
 
 def _opened(file):
-    import h5py
-
     return contextlib.nullcontext(file) if isinstance(file, h5py.File) else h5py.File(file, "r")
 
 
 def _declared(file, group):
     """Attributes of a group, its variables with their dimensions and attributes, and lengths of its dimensions."""
-    import h5netcdf
-
     with h5netcdf.File(file, "r") as content:
         own = content if group is None else content[group]
         variables = {name: (v.dimensions, _texts(v.attrs)) for name, v in own.variables.items()}
@@ -76,9 +69,6 @@ def _texts(attributes):
 
 
 def _variable(stored, dimensions, attributes, lengths, rows):
-    import h5py
-    import xarray as xr
-
     source = stored.asstr() if h5py.check_string_dtype(stored.dtype) else stored
     shape = tuple(lengths[dimension] for dimension in dimensions)
     if rows is None or dimensions[:1] != ("time",):

@@ -1,15 +1,15 @@
 """A run file that is open for reading: all that is asked of it costs one opening, and a group is read once."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import h5py
 import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
 
 from coupling.datasets.damage import damage_told
 from coupling.datasets.group import read_group_at_once
@@ -18,10 +18,6 @@ from coupling.files.folder import RUN_FILE, how_to_go_on, in_use
 from coupling.files.journal import readable
 from coupling.files.own_content import require_own_content
 from coupling.refused import RunFileError
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from numpy.typing import NDArray
 
 
 def run_file(path: str | Path) -> Path:

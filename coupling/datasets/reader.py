@@ -1,23 +1,18 @@
 """Readers of run files, in memory: each takes a run's folder or file, or a run that is open (see `opened`)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import xarray as xr
+from numpy.typing import NDArray
 
 from coupling.datasets.open_run import Run, opened
 from coupling.datasets.schema import identifier, structure_group
 from coupling.refused import RunFileError
 
-if TYPE_CHECKING:
-    import xarray as xr
-    from numpy.typing import NDArray
-
 
 def read_run(run: Run) -> xr.DataTree:
     """All groups of a run as an `xarray.DataTree`, in memory; groups as in :mod:`coupling.datasets`."""
-    import xarray as xr
-
     with opened(run) as file:
         groups = {"/".join(map(identifier, name.split("/"))): file.group(name) for name in file.names()}
         return xr.DataTree.from_dict({"/": file.group(None), **{f"/{name}": group for name, group in groups.items()}})

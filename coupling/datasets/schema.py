@@ -1,7 +1,5 @@
 """What a run file holds: its groups, its variables with units and meaning."""
 
-from __future__ import annotations
-
 import re
 
 from mpm.fields import CLAMPS, POINT

@@ -1,13 +1,7 @@
 """The angles around a lining at which a run file holds its pressures: 360 cells of one degree."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from numpy.typing import NDArray
 
 
 def cell_centres() -> NDArray[np.float64]:

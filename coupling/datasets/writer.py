@@ -1,13 +1,12 @@
 """The writer that appends to a run file while the run goes on."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import math
 import time as clock
 from pathlib import Path
 
+import h5netcdf
 import numpy as np
 
 from coupling.datasets.additions import CHECKED_FORMAT, append_to
@@ -25,9 +24,10 @@ from coupling.datasets.schema import (
     PRESSURES,
     PROGRESS,
     RING_FORCES,
-)
+)  # fmt: skip
 from coupling.datasets.theta_grid import cell_bounds, cell_centres, cell_mean_weights
 from coupling.files.replace import replace_file
+from mpm.laws.law import history_of
 
 SECONDS_BETWEEN_WRITES = 1.0
 
@@ -56,16 +56,9 @@ class RunWriter:
 
     @classmethod
     def continued(cls, path, scene, records, snapshots, **attributes):
-        """Writer for a file that holds at least so many records and snapshots; what follows is written over.
+        """Writer for a file of which so many records and snapshots are kept; rows behind them stay until written again.
 
-        Parameters
-        ----------
-        path, scene
-            As of the class.
-        records, snapshots : int
-            Rows that are kept; rows behind them stay until they are written again.
-        **attributes
-            Root attributes to set.
+        **attributes : of the root, to set.
         """
         writer = cls.__new__(cls)
         writer._start(path, scene, records, snapshots)
@@ -79,6 +72,7 @@ class RunWriter:
         self.attributes = {}  # of the root, written with the next batch
         self._count, self._snapshots = records, snapshots
         self._n_tunnels = len(scene.tunnels)
+        self._points = POINTS | {name: (unit, meaning) for name, unit, meaning in history_of(scene)}
         kinds = {scene.lining_of(tunnel) for tunnel in scene.tunnels}
         self._on_theta = PRESSURES | (MOTION if kinds - {"fixed"} else {}) | (RING_FORCES if "elastic" in kinds else {})
 
@@ -102,14 +96,8 @@ class RunWriter:
     def close(self, status, message="", judged=None, **attributes):
         """Write what waits and how the run ended, and return the pressures on the lining.
 
-        Parameters
-        ----------
-        status : {"finished", "failed", "interrupted"}
-        message : str
-        judged : callable, optional
-            Takes the whole `/history` and gives more attributes.
-        **attributes
-            Root attributes to set.
+        status : "finished", "failed" or "interrupted";  judged : takes the whole `/history` and gives more attributes;
+        **attributes : of the root, to set.
         """
         with self._written_batch() as (file, content):
             run = OpenRun(self.path, content)
@@ -139,39 +127,20 @@ class RunWriter:
         self._last_write = clock.monotonic()
 
     def _create(self, attributes, geometry, mesh):
-        import h5netcdf
-
         image = io.BytesIO()
         with h5netcdf.File(image, "w", libver=CHECKED_FORMAT) as file:
-            for name, value in {**attributes, "status": "running", "status_message": ""}.items():
-                file.attrs[name] = value
-            space = ("tunnel", "theta") if self._n_tunnels > 1 else ("theta",)
+            file.attrs.update({**attributes, "status": "running", "status_message": ""})
             lining = self._create_group(file, "lining", geometry)
             if self._n_tunnels > 0:
-                lining.dimensions.update({"theta": 360, "bounds": 2})
-                lining.attrs["coordinates"] = "theta_bnds"
-                if self._n_tunnels > 1:
-                    lining.dimensions["tunnel"] = self._n_tunnels
-                    _variable(lining, "tunnel", ("tunnel",), "i4", ("1", "tunnel, counted from 0"))[:] = np.arange(
-                        self._n_tunnels
-                    )
-                theta = _variable(lining, "theta", ("theta",), "f8", ("degree", "angle from the crown, clockwise"))
-                theta[:] = cell_centres()
-                theta.attrs["bounds"] = "theta_bnds"
-                lining.create_variable("theta_bnds", ("theta", "bounds"), "f8", fletcher32=True)[:] = cell_bounds()
-                shape = (16, *([self._n_tunnels] if self._n_tunnels > 1 else []), 360)
-                for name, meaning in self._on_theta.items():
-                    variable = _variable(lining, name, ("time", *space), "f8", meaning, shape)
-                    when = "mean" if name in PRESSURES else "point"
-                    variable.attrs["cell_methods"] = f"time: {when} theta: mean"
+                self._create_angles(lining)
             for name, meaning in PROGRESS.items():
                 _variable(lining, name, ("time",), "f8", meaning, (256,))
             history = self._create_group(file, "history", {})
             for name, meaning in HISTORY.items():
                 kind = "i8" if name in INTEGERS else "i1" if name == "dt_limit" else "f8"
                 _variable(history, name, ("time",), kind, meaning, (256,))
-            history["dt_limit"].attrs["flag_values"] = np.arange(len(DT_LIMITS), dtype="i1")
-            history["dt_limit"].attrs["flag_meanings"] = " ".join(DT_LIMITS)
+            flags = {"flag_values": np.arange(len(DT_LIMITS), dtype="i1"), "flag_meanings": " ".join(DT_LIMITS)}
+            history["dt_limit"].attrs.update(flags)
             for group in (lining, history):
                 for variable in group.variables.values():
                     if variable.dimensions[0] == "time" and variable.name.rpartition("/")[2] not in ("time", INFLOW):
@@ -182,11 +151,26 @@ class RunWriter:
                 _write_mesh(file.create_group("mesh"), mesh, geometry)
         replace_file(self.path, image.getbuffer())
 
+    def _create_angles(self, lining):
+        """Cells of the theta grid, and what is written on them."""
+        tunnels = {"tunnel": self._n_tunnels} if self._n_tunnels > 1 else {}
+        lining.dimensions.update({"theta": 360, "bounds": 2, **tunnels})
+        lining.attrs["coordinates"] = "theta_bnds"
+        for name, count in tunnels.items():
+            _variable(lining, name, (name,), "i4", ("1", "tunnel, counted from 0"))[:] = np.arange(count)
+        theta = _variable(lining, "theta", ("theta",), "f8", ("degree", "angle from the crown, clockwise"))
+        theta[:] = cell_centres()
+        theta.attrs["bounds"] = "theta_bnds"
+        lining.create_variable("theta_bnds", ("theta", "bounds"), "f8", fletcher32=True)[:] = cell_bounds()
+        for name, meaning in self._on_theta.items():
+            chunk = (16, *tunnels.values(), 360)
+            variable = _variable(lining, name, ("time", *tunnels, "theta"), "f8", meaning, chunk)
+            variable.attrs["cell_methods"] = f"time: {'mean' if name in PRESSURES else 'point'} theta: mean"
+
     @staticmethod
     def _create_group(file, name, attributes):
         group = file.create_group(name)
-        for key, value in attributes.items():
-            group.attrs[key] = value
+        group.attrs.update(attributes)
         group.dimensions["time"] = None
         time = _variable(group, "time", ("time",), "f8", ("s", "time since the gate opened"), (256,), fill=np.nan)
         del time.attrs["_FillValue"]  # CF knows no missing coordinates: rows without a time are not there yet
@@ -213,24 +197,14 @@ class RunWriter:
         rows = slice(self._count, self._count + len(batch))
         _grow_to(group, rows.stop)
         for name in HISTORY:
-            if name.startswith("clamp_"):
-                values = [record.clamp_counts.get(name.removeprefix("clamp_"), 0) for record in batch]
-            elif name in BALANCES:
-                values = [record.balances[name] for record in batch]
-            elif name in ERRORS:
-                values = [record.errors[name] for record in batch]
-            elif name == "dt_limit":
-                values = [_limit_flag(record.dt_limit) for record in batch]
-            else:
-                values = [getattr(record, name) for record in batch]
-            group[name][rows] = np.array(values)
+            group[name][rows] = np.array([_history_value(record, name) for record in batch])
         group["time"][rows] = [record.time for record in batch]
 
     def _write_points(self, group, snapshots):
         most = max(len(record.points["x"]) for record in snapshots)
         if "point" not in group.dimensions:
             group.dimensions["point"] = None
-            for name, meaning in POINTS.items():
+            for name, meaning in self._points.items():
                 if name in snapshots[0].points:
                     _variable(group, name, ("time", "point"), "f4", meaning, (1, most), fill=np.nan, compress=True)
         group.resize_dimension("point", max(most, group.dimensions["point"].size))
@@ -238,34 +212,40 @@ class RunWriter:
         _grow_to(group, rows.stop)
         for k, record in enumerate(snapshots, start=self._snapshots):
             present = ~record.points.get("removed", np.zeros(len(record.points["x"]), bool))
-            for name in POINTS:
+            for name in self._points:
                 if name in group.variables and name in record.points:
                     values = np.asarray(record.points[name])[present]
                     group[name][k, : len(values)] = values.astype("f4")
         group["time"][rows] = [record.time for record in snapshots]
 
 
+def _history_value(record, name):
+    if name.startswith("clamp_"):
+        return record.clamp_counts.get(name.removeprefix("clamp_"), 0)
+    if name == "dt_limit":
+        return DT_LIMITS.index(record.dt_limit) if record.dt_limit in DT_LIMITS else len(DT_LIMITS) - 1
+    home = record.balances if name in BALANCES else record.errors if name in ERRORS else None
+    return getattr(record, name) if home is None else home[name]
+
+
 def _write_mesh(group, mesh, geometry):
-    for key, value in geometry.items():
-        group.attrs[key] = value
-    group.attrs["Conventions"], group.attrs["coordinates"] = "CF-1.11 UGRID-1.0", "x y"
+    group.attrs.update({**geometry, "Conventions": "CF-1.11 UGRID-1.0", "coordinates": "x y"})
     group.dimensions.update({"node": len(mesh.nodes), "element": len(mesh.elements), "corner": 3})
-    topology = group.create_variable("topology", (), "i4")
-    topology.attrs.update({
+    group.create_variable("topology", (), "i4").attrs.update({
         "cf_role": "mesh_topology", "long_name": "triangles of the mesh", "topology_dimension": np.int32(2),
         "node_coordinates": "x y", "face_node_connectivity": "element_nodes", "face_dimension": "element",
     })  # fmt: skip
     for axis, name, k in (("horizontal", "x", 0), ("vertical", "y", 1)):
-        node = _variable(group, name, ("node",), "f8", ("m", f"{axis} position of the node"))
-        node[:] = mesh.nodes[:, k]
+        _variable(group, name, ("node",), "f8", ("m", f"{axis} position of the node"))[:] = mesh.nodes[:, k]
     corners = _variable(group, "element_nodes", ("element", "corner"), "i4", ("1", "nodes, counter-clockwise, from 0"))
     corners[:] = mesh.elements
-    corners.attrs["cf_role"], corners.attrs["start_index"] = "face_node_connectivity", np.int32(0)
+    corners.attrs.update({"cf_role": "face_node_connectivity", "start_index": np.int32(0)})
     region = _variable(group, "region", ("element",), "i1", ("1", "part of the mesh"))
     region[:] = mesh.region
-    region.attrs["mesh"], region.attrs["location"] = "topology", "face"
-    region.attrs["flag_values"] = np.arange(4, dtype="i1")
-    region.attrs["flag_meanings"] = "soil channel interior headroom"
+    region.attrs.update({
+        "mesh": "topology", "location": "face", "flag_values": np.arange(4, dtype="i1"),
+        "flag_meanings": "soil channel interior headroom",
+    })  # fmt: skip
 
 
 def _variable(group, name, dimensions, kind, meaning, chunks=None, fill=None, compress=False):
@@ -278,7 +258,3 @@ def _variable(group, name, dimensions, kind, meaning, chunks=None, fill=None, co
 def _grow_to(group, rows):
     # never shrinks: a continued run may find records that it is about to compute again
     group.resize_dimension("time", max(rows, group.dimensions["time"].size))
-
-
-def _limit_flag(name):
-    return DT_LIMITS.index(name) if name in DT_LIMITS else len(DT_LIMITS) - 1

@@ -8,12 +8,12 @@ from coupling.datasets.geometry import gate_diameter, gate_position, tunnels
 from coupling.postprocess.elements import (
     element_areas,
     element_centres,
+    element_fields,
     element_means,
     element_of_points,
     pore_pressure_steps,
 )
 from coupling.postprocess.extremes import extremes
-from coupling.postprocess.fields import element_fields
 from coupling.postprocess.flow_zone import Stages, flow_zone_stages
 from coupling.postprocess.ground_axes import arch, influence_distance, profile, stress_variation
 from coupling.postprocess.heap import filled, heap
@@ -29,32 +29,9 @@ from coupling.postprocess.inflow import (
 from coupling.postprocess.settlement import share_within, surface_settlement, trough
 
 __all__ = [
-    "Stages",
-    "additional_at_inflow",
-    "arch",
-    "at_inflow",
-    "by_inflow",
-    "element_areas",
-    "element_centres",
-    "element_fields",
-    "element_means",
-    "element_of_points",
-    "extremes",
-    "filled",
-    "flow_zone_stages",
-    "gate_diameter",
-    "gate_position",
-    "heap",
-    "inflow_linearity",
-    "influence_distance",
-    "pore_pressure_steps",
-    "pressure_ratio",
-    "profile",
-    "ratio_to_initial",
-    "share_within",
-    "stress_variation",
-    "surface_settlement",
-    "trough",
-    "tunnels",
+    "Stages", "additional_at_inflow", "arch", "at_inflow", "by_inflow", "element_areas", "element_centres",
+    "element_fields", "element_means", "element_of_points", "extremes", "filled", "flow_zone_stages", "gate_diameter",
+    "gate_position", "heap", "inflow_linearity", "influence_distance", "pore_pressure_steps", "pressure_ratio",
+    "profile", "ratio_to_initial", "share_within", "stress_variation", "surface_settlement", "trough", "tunnels",
     "with_inflow",
-]
+]  # fmt: skip

@@ -1,16 +1,81 @@
-"""Points of a snapshot averaged in the elements of the mesh, and how much neighbouring elements differ."""
+"""Points averaged in the elements of the mesh or other cells, and how much neighbouring elements differ."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
 
 from coupling.datasets.geometry import gate_position
 
-if TYPE_CHECKING:
-    import xarray as xr
-    from numpy.typing import NDArray
+#: Quantities of points that are shown: name to (units, long_name).
+QUANTITIES = {
+    "soil_stress_vertical": ("Pa", "vertical effective stress, compression positive"),
+    "soil_stress_horizontal": ("Pa", "horizontal effective stress, compression positive"),
+    "pore_pressure": ("Pa", "pore pressure, compression positive"),
+    "displacement": ("m", "displacement since the start"),
+}
+STRAIN = {"deviatoric_strain": ("1", "accumulated equivalent deviatoric strain")}
+
+
+def point_quantities(points: xr.Dataset) -> dict[str, NDArray[np.float64]]:
+    """Quantities of :data:`QUANTITIES` and `STRAIN` of every point; missing water counts as no pressure."""
+    return {
+        "soil_stress_vertical": -points["stress_yy"].values,
+        "soil_stress_horizontal": -points["stress_xx"].values,
+        "pore_pressure": np.maximum(points["pore_pressure"].values, 0.0),
+        "displacement": np.hypot(points["displacement_x"].values, points["displacement_y"].values),
+        **{name: points[name].values for name in STRAIN if name in points},
+    }
+
+
+def means_in_cells(
+    points: xr.Dataset, cells: Callable[[xr.Dataset], NDArray], count: int, dim: str, about: dict[str, tuple[str, str]]
+) -> xr.Dataset:
+    """Means by volume of the points in some cells, for every snapshot: the variables of `about` (time, dim).
+
+    cells : takes one snapshot and gives the number of every point's cell, see :func:`cell_means`.
+    """
+    if "time" not in points.dims:
+        points = points.expand_dims("time")
+    rows = []
+    for k in range(points.sizes["time"]):
+        now = points.isel(time=k)
+        cell, values = cells(now), point_quantities(now)
+        rows.append([cell_means(cell, now["volume"].values, values[name], count) for name in about])
+    return xr.Dataset(
+        {
+            name: (("time", dim), np.array(row), {"units": units, "long_name": text})
+            for row, (name, (units, text)) in zip(zip(*rows, strict=True), about.items(), strict=True)
+        },
+        coords={"time": points["time"]},
+    )
+
+
+def element_fields(points: xr.Dataset, mesh: xr.Dataset) -> xr.Dataset:
+    """Means by volume of the points in every element, for every snapshot.
+
+    Points have no lasting order in a run file, elements have: fields of elements can be compared between snapshots and
+    interpolated in time.
+
+    Parameters
+    ----------
+    points : xarray.Dataset
+        `/points` of a run, all snapshots or one.
+    mesh : xarray.Dataset
+        `/mesh` of the run.
+
+    Returns
+    -------
+    xarray.Dataset
+        Variables of :data:`QUANTITIES` and deviatoric_strain [-] (time, element), NaN in empty elements; x, y
+        (element): centres [m]. Attributes of the mesh.
+    """
+    centre = element_centres(mesh)
+    fields = means_in_cells(
+        points, lambda now: element_of_points(now, mesh), len(centre), "element", QUANTITIES | STRAIN
+    )
+    return fields.assign_coords(x=("element", centre[:, 0]), y=("element", centre[:, 1])).assign_attrs(mesh.attrs)
 
 
 def element_means(

@@ -1,17 +1,12 @@
 """The largest and smallest values around a ring, and where they are."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
 
 from structure.response import FORCES, SHOWN
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from numpy.typing import NDArray
 
 
 def extremes(dataset: xr.Dataset, names: Sequence[str] = FORCES, along: str = "theta") -> xr.Dataset:
@@ -32,8 +27,6 @@ def extremes(dataset: xr.Dataset, names: Sequence[str] = FORCES, along: str = "t
         For every name NAME_max, NAME_min in its unit, NAME_max_angle, NAME_min_angle: the value of `along` there; NaN
         where all values are.
     """
-    import xarray as xr
-
     result = xr.Dataset(attrs=dataset.attrs)
     for name in names:
         if along not in dataset[name].dims:

@@ -1,13 +1,9 @@
 """The stages in which the flow zone grows: slowly, rapidly, hardly any more."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-
-if TYPE_CHECKING:
-    import xarray as xr
+import xarray as xr
 
 #: Places at which the line may bend, evenly over the record; 60 of them decide a bend to 1.7 % of the record.
 BENDS = 60

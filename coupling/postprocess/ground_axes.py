@@ -1,37 +1,13 @@
 """Stresses and pore pressure along the horizontal and vertical axis through the gate, and how far the gate reaches."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
 
 from coupling.datasets.geometry import gate_diameter, gate_of, gate_position, tunnel_list
-from coupling.postprocess.elements import cell_means
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from numpy.typing import NDArray
+from coupling.postprocess.elements import QUANTITIES, means_in_cells
 
 #: Initial stresses below this share of the largest on the axis are left out of ratios: those at the ground surface.
 SMALLEST_INITIAL = 0.05
-#: name: (units, long_name)
-QUANTITIES = {
-    "soil_stress_vertical": ("Pa", "vertical effective stress, compression positive"),
-    "soil_stress_horizontal": ("Pa", "horizontal effective stress, compression positive"),
-    "pore_pressure": ("Pa", "pore pressure, compression positive"),
-    "displacement": ("m", "displacement since the start"),
-}
-
-
-def point_quantities(points: xr.Dataset) -> dict[str, NDArray[np.float64]]:
-    """Quantities of :data:`QUANTITIES` of every point, name to array; missing water counts as no pressure."""
-    return {
-        "soil_stress_vertical": -points["stress_yy"].values,
-        "soil_stress_horizontal": -points["stress_xx"].values,
-        "pore_pressure": np.maximum(points["pore_pressure"].values, 0.0),
-        "displacement": np.hypot(points["displacement_x"].values, points["displacement_y"].values),
-    }
 
 
 def profile(points: xr.Dataset, direction: str, spacing: float = 0.5, half_width: float = 0.5) -> xr.Dataset:
@@ -48,7 +24,8 @@ def profile(points: xr.Dataset, direction: str, spacing: float = 0.5, half_width
     Returns
     -------
     xarray.Dataset
-        Variables of :data:`QUANTITIES` (time, distance), means by volume; NaN where there is no ground. `distance` [m]
+        Means by volume (time, distance) of :data:`coupling.postprocess.elements.QUANTITIES`; NaN where there is no
+        ground. `distance` [m]
         from the gate's middle on the outer face, to the right or upward positive. Attributes of the points.
 
     Raises
@@ -56,39 +33,26 @@ def profile(points: xr.Dataset, direction: str, spacing: float = 0.5, half_width
     ValueError
         Neither direction.
     """
-    import xarray as xr
-
     if direction not in ("horizontal", "vertical"):
         raise ValueError(f"profile: direction must be 'horizontal' or 'vertical', got {direction!r}")
-    if "time" not in points.dims:
-        points = points.expand_dims("time")
     gate = gate_position(points)
-    reach = float(np.nanmax(np.abs(points["x" if direction == "horizontal" else "y"].values))) + 20.0
+    horizontal = direction == "horizontal"
+    reach = float(np.nanmax(np.abs(points["x" if horizontal else "y"].values))) + 20.0
     count = int(np.ceil(reach / spacing))
     edges = spacing * (np.arange(-count, count + 1) - 0.5)
-    rows = {name: [] for name in QUANTITIES}
-    for k in range(points.sizes["time"]):
-        now = points.isel(time=k)
-        x, y, volume = now["x"].values, now["y"].values, now["volume"].values
-        ground = np.isfinite(x)
+
+    def cells(now):
+        x, y = now["x"].values, now["y"].values
+        along, across = (x - gate[0], y - gate[1]) if horizontal else (y - gate[1], x - gate[0])
+        ground = np.isfinite(x) & (np.abs(across) <= half_width)
         for tunnel in tunnel_list(points):
             ground &= tunnel.distance(x, y) > tunnel.outer
-        along, across = (x - gate[0], y - gate[1]) if direction == "horizontal" else (y - gate[1], x - gate[0])
-        ground &= np.abs(across) <= half_width
-        cell = np.where(ground, np.digitize(along, edges) - 1, -1)
-        for name, values in point_quantities(now).items():
-            rows[name].append(cell_means(cell, volume, values, len(edges) - 1))
-    return xr.Dataset(
-        {
-            name: (("time", "distance"), np.array(rows[name]), {"units": units, "long_name": text})
-            for name, (units, text) in QUANTITIES.items()
-        },
-        coords={
-            "time": points["time"],
-            "distance": ("distance", 0.5 * (edges[1:] + edges[:-1]), {"units": "m", "long_name": "from the gate"}),
-        },
-        attrs={**points.attrs, "direction": direction},
-    ).dropna("distance", how="all")
+        return np.where(ground, np.digitize(along, edges) - 1, -1)
+
+    axis = means_in_cells(points, cells, len(edges) - 1, "distance", QUANTITIES)
+    distance = ("distance", 0.5 * (edges[1:] + edges[:-1]), {"units": "m", "long_name": "from the gate"})
+    axis = axis.assign_coords(distance=distance).assign_attrs({**points.attrs, "direction": direction})
+    return axis.dropna("distance", how="all")
 
 
 def stress_variation(now: xr.DataArray, initial: xr.DataArray) -> xr.DataArray:
@@ -159,8 +123,6 @@ def arch(axis: xr.Dataset, name: str = "soil_stress_vertical", window: float = 1
         distance (time) [m] from the gate, diameters (time) [D], ratio (time) [-]; the first two NaN where the stress is
         raised by less than 2 %, twice what averages over a cell scatter by at rest.
     """
-    import xarray as xr
-
     change = _on_ground_side(stress_variation(axis[name], axis[name].isel(time=0, drop=True)), axis)
     ratio = 1.0 + _smoothed(change, window)
     largest = ratio.max("distance")

@@ -1,17 +1,11 @@
 """The heap of material that has landed inside the tunnel."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
 
 from coupling.datasets.geometry import tunnel_of
 from coupling.postprocess.elements import element_areas, element_of_points
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from numpy.typing import NDArray
 
 RESTING_SPEED = 0.5  # m/s; material falling onto the heap moves with several m/s
 

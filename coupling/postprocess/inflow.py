@@ -1,14 +1,9 @@
 """States of a run at equal inflow mass, what they are over the initial state, and how evenly material flows in."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
-
-if TYPE_CHECKING:
-    import xarray as xr
+import xarray as xr
 
 
 def at_inflow(dataset: xr.Dataset, inflow_mass: float) -> xr.Dataset:

@@ -1,18 +1,13 @@
 """How good a run is by its own account: errors with verdicts, and what its points were held at."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from mpm.errors import COMPARED
 from mpm.fields import CLAMPS
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    import xarray as xr
 
 
 class Judged(NamedTuple):

@@ -1,15 +1,9 @@
 """The settlement of the ground surface and the trough it makes."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
 
 from coupling.postprocess.elements import cell_means
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def surface_settlement(points: xr.Dataset, spacing: float = 1.0, depth: float = 1.0) -> xr.DataArray:
@@ -34,8 +28,6 @@ def surface_settlement(points: xr.Dataset, spacing: float = 1.0, depth: float = 
     ValueError
         No point in the layer.
     """
-    import xarray as xr
-
     if "time" not in points.dims:
         points = points.expand_dims("time")
     x_start = points["x"].values - points["displacement_x"].values
@@ -83,7 +75,6 @@ def trough(settlement: xr.DataArray) -> xr.Dataset:
 
     Source of the curve: Peck (1969).
     """
-    import xarray as xr
     from scipy.optimize import curve_fit
 
     def gauss(x, largest, centre, width):

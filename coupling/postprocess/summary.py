@@ -1,22 +1,16 @@
 """What a run came to, in a few numbers: the table and the JSON of `gush run` and `gush respond`."""
 
-from __future__ import annotations
+from typing import Any
 
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+import xarray as xr
 
 from coupling.datasets import opened, read_attributes, read_history, read_pressures
 from coupling.datasets.geometry import on_tunnel, tunnels_beside
+from coupling.datasets.open_run import Run
 from coupling.postprocess.extremes import extremes
 from coupling.postprocess.quality import lining_equilibrium, quality, verdicts
 from mpm.fields import CLAMPS
 from structure.response import FORCES
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from coupling.datasets.open_run import Run
 
 PLACES = {"crown": 0, "right waist": 90, "invert": 180, "left waist": 270}
 
@@ -47,8 +41,7 @@ def summarise_run(run: Run) -> dict[str, Any]:
             data[name] = float(attributes[name])
     if not data["records"]:
         return data | {"tunnels": {}}
-    last = history.isel(time=-1)
-    mass = history["grain_mass"].values
+    last, errors = history.isel(time=-1), quality(history)
     limits = history["dt_limit"].attrs["flag_meanings"].split()
     steps, simulated = int(last["steps"]), float(last["time"])
     data |= {
@@ -59,12 +52,12 @@ def summarise_run(run: Run) -> dict[str, Any]:
         "point_steps_per_cpu_second": float(last["point_steps"]) / max(float(last["cpu_seconds"]), 1e-9),
         "mean_dt": simulated / steps if steps else float(last["dt"]),
         "dt_limit": limits[int(last["dt_limit"])],
-        "grain_mass_error": float(np.max(np.abs(mass / mass[0] - 1))),
         "clamps": {name: int(last[f"clamp_{name}"]) for name in CLAMPS},
-        "quality": quality(history),
+        "grain_mass_error": errors["grain_mass_error"],
+        "quality": errors,
+        "verdicts": verdicts(errors),
+        "tunnels": {},
     }
-    data["verdicts"] = verdicts(data["quality"])
-    data["tunnels"] = {}
     if "soil_pressure" in pressures:
         for k in tunnels_beside(pressures):
             data["tunnels"][k] = _at_places(on_tunnel(pressures, k)) | {"response": None}

@@ -90,7 +90,7 @@ def study_folder(path: str | Path) -> Path | None:
     Refused
         A folder that holds neither or both.
     """
-    from coupling.studies.execute import DATA_FILE, STUDY_FILE
+    from coupling.studies.folder import DATA_FILE, STUDY_FILE
 
     path = Path(path)
     if not path.is_dir():

@@ -12,7 +12,7 @@ from coupling.report.numbers import key_numbers, quality, warnings
 from coupling.report.packing import packed
 from coupling.report.scene_facts import left_out, read_scene, section
 from coupling.report.series import choose_frames, history_series, lining_series, model_series
-from coupling.scenes.facts import facts
+from coupling.scenes.features import facts
 
 SCRIPTS = (
     "unpack.js", "run_data.js", "charts.js", "tables.js", "slider.js", "ring_views.js", "history_views.js",

@@ -16,7 +16,7 @@ from coupling.report.study_series import (
     ring_extremes_over_mass,
     slider_stops,
 )
-from coupling.scenes.facts import facts
+from coupling.scenes.features import facts
 from coupling.studies.case import RUN_FOLDER
 from coupling.studies.collect import stored_cases, unreadable
 from coupling.studies.design import Range, StudyError, value_text

@@ -4,10 +4,12 @@ import time as clock
 from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from coupling.datasets.geometry import gate_of
 from coupling.files.provenance import origin, with_history
 from coupling.refused import Refused
+from coupling.responses.respond import respond_by_name
 from structure.response import RESPONSE, SHOWN
 
 TITLE = "differences between lining models"
@@ -61,8 +63,6 @@ def compare(source, first="beam-spring", second="continuum", open_gate=None):
         An unknown model, the same one twice, or one that refuses ring or pressures.
     structure.LiningFailure
     """
-    from coupling.responses.respond import respond_by_name
-
     places, (first, second) = (first, second), (model.rpartition(":")[2] for model in (first, second))
     if first == second:
         raise Refused(f"compare: models must differ, got {first!r} twice; choose another --first or --second")
@@ -99,8 +99,6 @@ def _gate_options(source, cut):
 
 def _differences(first, second, ring):
     """Second less first, with the offset of the curved section and what is left without it."""
-    import xarray as xr
-
     from structure.theory import curved_section_moment
 
     missing = sorted(set(QUANTITIES) - set(first.data_vars) | set(QUANTITIES) - set(second.data_vars))

@@ -1,21 +1,23 @@
-"""The answer of a ring to the pressures on its tunnel, by a lining model of some name."""
+"""The answer of a ring to pressures: by a lining model of some name, held against limits, and where it is stored."""
 
-from __future__ import annotations
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
-from typing import TYPE_CHECKING, Any
+import xarray as xr
 
+from coupling.datasets import write_dataset, write_response
 from coupling.datasets.geometry import on_tunnel, tunnels_beside
+from coupling.files.provenance import origin, with_history
 from coupling.refused import Refused, SceneError
+from coupling.responses.source import Source
 from coupling.scenes.rings import gate_tunnel, ring_of
+from coupling.scenes.scene import Scene
+from structure import Limits, check, lining_model
+from structure.checks import UTILISATIONS
+from structure.lining import at_whole_degrees
 from structure.models import model_name
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    import xarray as xr
-
-    from coupling.scenes.scene import Scene
-    from structure.ring import Ring
+from structure.ring import Ring
 
 
 def respond(scene: Scene, pressures: xr.Dataset, backend: str = "beam-spring", tunnel: int | None = None) -> xr.Dataset:
@@ -23,12 +25,8 @@ def respond(scene: Scene, pressures: xr.Dataset, backend: str = "beam-spring", t
 
     tunnel : int or None, None: the one with the gate.
 
-    Raises
-    ------
-    Refused
-        No ring, no such model, or pressures or ring that the model does not take.
-    structure.LiningFailure
-        No equilibrium.
+    Raises Refused: no ring, no such model, or pressures or ring that the model does not take; structure.LiningFailure:
+    no equilibrium.
     """
     number = gate_tunnel(scene) if tunnel is None else tunnel
     pressures = on_tunnel(pressures, number)
@@ -50,15 +48,67 @@ def responses_on(
 def respond_by_name(ring: Ring, pressures: xr.Dataset, backend: str, **options: Any) -> xr.Dataset:
     """Response of a ring by the lining model of that name; `options` go to the model.
 
-    Raises
-    ------
-    Refused, structure.LiningFailure
-        As :func:`respond`.
+    Raises Refused, structure.LiningFailure: as :func:`respond`.
     """
-    from structure import lining_model
-    from structure.lining import at_whole_degrees
-
     try:
         return at_whole_degrees(lining_model(backend)(ring, **options).respond(pressures))
     except ValueError as problem:
         raise Refused(str(problem)) from problem
+
+
+def read_limits(path: Path) -> Limits:
+    """The limits of a TOML file.
+
+    Raises Refused, structure.InputError: not readable; or no TOML, or no limits: every mistake with key, rule, value
+    and remedy.
+    """
+    try:
+        return Limits.from_toml(path)
+    except OSError as problem:
+        raise Refused(f"limits '{path}': cannot be read: {problem.strerror}; give a TOML file") from problem
+
+
+def with_checks(response: xr.Dataset, limits: Limits) -> tuple[xr.Dataset, dict[str, float]]:
+    """The response with the variables of `structure.check`, and the largest value of every utilisation.
+
+    Raises Refused: the response lacks what a limit needs.
+    """
+    try:
+        checked = check(response, limits)
+    except ValueError as problem:
+        raise Refused(str(problem)) from problem
+    return checked, {name: float(checked[name].max()) for name in UTILISATIONS if name in checked}
+
+
+def chosen_file(source: Source, model: str, out: Path | None = None, overwrite: bool = False) -> Path | None:
+    """The file of its own that a response goes into, checked before it is computed; None: it belongs into the run.
+
+    Without `out` that is the run where pressures and ring are its own, else `<file>-<model>.nc` beside the file. With
+    the number of a tunnel without the gate, `-tunnel-<number>` stands before the ending.
+
+    Raises Refused: the file is there, or its folder is not; or it is the one that the pressures come from.
+    """
+    if out is None and source.is_own:
+        return None
+    path = source.file.with_name(f"{source.file.stem}-{model}.nc") if out is None else out
+    if source.tunnel is not None:
+        path = path.with_name(f"{path.stem}-tunnel-{source.tunnel}{path.suffix}")
+    if path.exists() and path.samefile(source.file):
+        raise Refused(f"output '{path}': must not be the file of the pressures; choose another --out")
+    if path.is_dir() or not path.absolute().parent.is_dir():
+        raise Refused(f"output '{path}': must be a file in an existing folder; choose another --out")
+    if path.exists() and not overwrite:
+        raise Refused(f"output '{path}': is there already; choose another --out, or ask for --overwrite")
+    return path
+
+
+def store_response(response: xr.Dataset, source: Source, model: str, path: Path | None) -> Path:
+    """Store a response in the file from :func:`chosen_file`, or in the run for None; returns the file."""
+    if path is None:
+        write_response(source.file, response, model, source.tunnel)
+        return source.file
+    about = {"Conventions": "CF-1.11", **origin(), **response.attrs}
+    about["history"] = with_history("", f"response of {model} to the pressures of {source.file.name}")
+    path.unlink(missing_ok=True)
+    write_dataset(path, response.assign_attrs(about))
+    return path

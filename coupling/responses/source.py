@@ -3,34 +3,40 @@
 from pathlib import Path
 from typing import NamedTuple
 
+import xarray as xr
 from pydantic import ValidationError
 
 from coupling.datasets import RunFileError, opened, run_file
 from coupling.datasets.geometry import on_tunnel, tunnels_beside
+from coupling.refused import SceneError
+from coupling.scenes.rings import ring_of
+from coupling.scenes.scene import Scene, load_scene, parse_scene
+from structure.inputs import mistakes, refusal
+from structure.lining import check_pressures
+from structure.ring import Ring
 
 
 class Source(NamedTuple):
-    """Pressures of one tunnel and the ring they act on.
+    """Pressures (time, theta) [Pa] of one tunnel and the ring they act on.
 
-    file : path;  is_own : whether they are the group /lining of a run and the ring is that run's own, so that the
-    response belongs into the run;  pressures : xarray.Dataset (time, theta) [Pa];  ring : structure.Ring;
-    tunnel : int or None, None: the only one, or that with the gate.
+    is_own : whether they are the group /lining of a run and the ring is that run's own, so that the response belongs
+    into the run;  tunnel : None: the only one, or that with the gate.
     """
 
     file: Path
     is_own: bool
-    pressures: object
-    ring: object
+    pressures: xr.Dataset
+    ring: Ring
     tunnel: int | None = None
 
 
-def read_source(path, scene=None):
+def read_source(path: str | Path, scene: str | None = None) -> Source:
     """Pressures and ring of the tunnel with the gate: the first of :func:`read_sources`."""
     return read_sources(path, scene)[0]
 
 
-def read_sources(path, scene=None):
-    """Pressures and rings of a run, or of a file written by hand or by another program, one for each tunnel.
+def read_sources(path: str | Path, scene: str | None = None) -> list[Source]:
+    """Pressures and rings of all tunnels, that with the gate first, of a run, or of a file of another origin.
 
     Parameters
     ----------
@@ -40,27 +46,16 @@ def read_sources(path, scene=None):
         Scene whose rings are taken. Left out: the scene stored with the run, or the attribute `ring` (JSON of a
         `structure.Ring`) of the file.
 
-    Returns
-    -------
-    list of Source
-        That of the tunnel with the gate first.
-
-    Raises
-    ------
-    RunFileError
-        Unreadable, not following the schema, or without a ring: which file, rule, value, remedy.
-    coupling.refused.SceneError
-        No such scene, or one whose rings do not fit its tunnels.
+    Raises RunFileError: unreadable, not following the schema, or without a ring: which file, rule, value, remedy;
+    coupling.refused.SceneError: no such scene, or one whose rings do not fit its tunnels.
     """
-    from coupling.refused import SceneError
-    from coupling.scenes.scene import load_scene, parse_scene
-
     file = run_file(path)
     with opened(file) as run:
         is_run = "lining" in run.names()
         root = run.group(None)
         pressures = run.group("lining") if is_run else root
-    chosen = own = None
+    chosen: Scene | None = None
+    own: Scene | None = None
     if "scene" in root.attrs:
         try:
             own = chosen = parse_scene(root.attrs["scene"], str(file))
@@ -81,8 +76,6 @@ def read_sources(path, scene=None):
 
 
 def _source(file, is_run, pressures, root, own, chosen, tunnel):
-    from structure.lining import check_pressures
-
     ring = _ring(file, root, chosen, tunnel)
     try:
         checked = check_pressures(pressures, ring)
@@ -93,10 +86,6 @@ def _source(file, is_run, pressures, root, own, chosen, tunnel):
 
 
 def _ring(file, root, scene, tunnel):
-    from coupling.scenes.rings import ring_of
-    from structure import Ring
-    from structure.inputs import mistakes, refusal
-
     if scene is not None:
         if scene.ring is None:
             raise RunFileError(f"'{file}': scene '{scene.name}' has no [ring]; choose another --scene")

@@ -1,24 +1,18 @@
 """What a run would do and cost, before it starts: the table and the JSON of `gush plan`."""
 
-from __future__ import annotations
-
 import math
 import time as clock
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from coupling.runs.memory import check_memory, free_memory_bytes
 from coupling.scenes.features import features, initial_k0
 from coupling.scenes.plausibility import warn_in_python, warnings_of
-from coupling.scenes.scene import as_scene
-
-if TYPE_CHECKING:
-    from coupling.scenes.scene import Scene
-    from mpm.scene import Scene as MpmScene
-
+from coupling.scenes.scene import Scene, as_scene
+from mpm.scene import Scene as MpmScene
 
 WARM_UP_STEPS, MEASURED_SPELLS, SECONDS_A_SPELL = 10, 5, 0.3
 # Inflow of grains over that of free discharge under the head at the gate, from runs of case 3 (docs/case-3.md): a rough
@@ -57,36 +51,42 @@ def plan(
     solver = mpm.Solver(scene, mesh, threads)
     dt, limit = solver.time_step_estimate()
     rate = _measured_rate(solver)
-    stop = scene.stop
-    time, interval = expected_time(scene), scene.output.interval
-    most = None if stop.time is None else _work(solver, dt, interval, stop.time)[0]
+    interval, time = scene.output.interval, expected_time(scene)
     steps, point_steps = _work(solver, dt, interval, time)
     return {
-        "scene": scene.name,
-        "features": features(scene, solver.threads, _why_alone(len(solver.mesh.elements), threads)),
-        "initial_k0": initial_k0(scene),
-        "elements": len(solver.mesh.elements),
-        "nodes": len(solver.mesh.nodes),
+        **_of_scene(scene, solver.threads, len(mesh.elements), threads),
+        "elements": len(mesh.elements),
+        "nodes": len(mesh.nodes),
         "points": int(solver.n_points),
         "min_altitude": float(mesh.quality["min_altitude"]),
         "min_angle": float(mesh.quality["min_angle"]),
         "dt": float(dt),
         "dt_limit": limit,
-        "stop_time": stop.time,
-        "stop_inflow_mass": stop.inflow_mass,
-        "steps_to_stop_time": most,
-        "expected_time": time,
+        "steps_to_stop_time": None if scene.stop.time is None else _work(solver, dt, interval, scene.stop.time)[0],
         "expected_steps": steps,
         "expected_point_steps": point_steps,
-        "records": 1 + _intervals(interval, time)[0],
         "memory_bytes": int(solver.memory_bytes()),
-        "free_memory_bytes": free_memory_bytes(),
         "point_steps_per_second": rate,
         "expected_seconds": point_steps / rate,
     }
 
 
-def _checked(scene, warn):
+def _of_scene(scene, threads, elements, asked):
+    """What a plan says without a mesh; `asked` are the threads that were asked for."""
+    time = expected_time(scene)
+    return {
+        "scene": scene.name,
+        "features": features(scene, threads, _why_alone(elements, asked)),
+        "initial_k0": initial_k0(scene),
+        "stop_time": scene.stop.time,
+        "stop_inflow_mass": scene.stop.inflow_mass,
+        "expected_time": time,
+        "records": 1 + _intervals(scene.output.interval, time)[0],
+        "free_memory_bytes": free_memory_bytes(),
+    }
+
+
+def _checked(scene: Scene | str | Path, warn: Callable[[str], None] | None) -> Scene:
     """A valid scene that fits into the memory, what is unusual in it told."""
     scene = as_scene(scene)
     for warning in warnings_of(scene):
@@ -148,39 +148,27 @@ def rough_plan(
         stop_inflow_mass [kg/m], steps_to_stop_time, expected_time [s], expected_steps, records, memory_bytes,
         free_memory_bytes. Elements, points and dt are right within a factor of three where the mesh is regular.
 
-    Raises
-    ------
-    coupling.refused.Refused
-        Too little memory.
+    Raises coupling.refused.Refused: too little memory.
     """
     from mpm.machine.threads import check_threads
     from mpm.solver import threads_used
 
     scene = _checked(scene, warn)
     check_threads(threads)
-    elements, time = scene.estimated_elements, expected_time(scene)
+    elements, interval, stop = scene.estimated_elements, scene.output.interval, scene.stop.time
     sizes = [scene.discretisation.element_size] + [scene.discretisation.element_size_lining] * bool(scene.tunnels)
     if scene.gate is not None:
         sizes.append(scene.gate.width / scene.discretisation.elements_across_gate)
     # between the altitude of an equilateral triangle and the flattest that the mesher lets pass
-    dt = scene.numerics.courant * 0.6 * min(sizes) / max(_wave_speed(soil, scene.water) for soil in scene.soils)
+    dt = scene.numerics.courant * 0.6 * min(sizes) / max(_wave_speed(soil, scene) for soil in scene.soils)
     return {
-        "scene": scene.name,
-        "features": features(scene, threads_used(elements, threads), _why_alone(elements, threads)),
-        "initial_k0": initial_k0(scene),
+        **_of_scene(scene, threads_used(elements, threads), elements, threads),
         "elements": math.ceil(elements),
         "points": math.ceil(elements * scene.discretisation.points_per_element),
         "dt": dt,
-        "stop_time": scene.stop.time,
-        "stop_inflow_mass": scene.stop.inflow_mass,
-        "steps_to_stop_time": None
-        if scene.stop.time is None
-        else _rough_steps(dt, scene.output.interval, scene.stop.time),
-        "expected_time": time,
-        "expected_steps": None if time is None else _rough_steps(dt, scene.output.interval, time),
-        "records": None if time is None else 1 + _intervals(scene.output.interval, time)[0],
+        "steps_to_stop_time": None if stop is None else _rough_steps(dt, interval, stop),
+        "expected_steps": _rough_steps(dt, interval, expected_time(scene)),
         "memory_bytes": math.ceil(scene.estimated_bytes),
-        "free_memory_bytes": free_memory_bytes(),
     }
 
 
@@ -190,11 +178,11 @@ def _rough_steps(dt, interval, time):
     return (count - 1) * math.ceil(interval / dt) + math.ceil(last / dt)
 
 
-def _wave_speed(soil, water):
+def _wave_speed(soil, scene):
     from mpm.pace.wave_speed import dry_wave_speed, fast_wave_speed
 
-    nu = soil.poissons_ratio
-    modulus = soil.youngs_modulus * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
+    nu, water = soil.poissons_ratio, scene.water
+    modulus = soil.youngs_modulus_at(scene.vertical_stress(scene.box.depth)) * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
     if water is None:
         return dry_wave_speed(modulus, soil.porosity, soil.grain_density)
     return fast_wave_speed(modulus, water.bulk_modulus, soil.porosity, soil.grain_density, water.density)

@@ -24,12 +24,7 @@ class ProgressLine:
     """The line of a computation, as a context; callable with the solver's progress dicts.
 
     On a terminal and in a notebook it is one line that changes. Elsewhere (a log, a pipe, a queue) a line is printed to
-    standard error every ten seconds, also while nothing is told.
-
-    Parameters
-    ----------
-    quiet : bool
-        Nothing is shown.
+    standard error every ten seconds, also while nothing is told. With `quiet` nothing is shown.
     """
 
     def __init__(self, quiet: bool = False):

@@ -30,19 +30,8 @@ log = logging.getLogger("coupling.runs")
 class RecordedSimulation:
     """Runs a scene into a folder that is held, from the beginning or from what an earlier run left.
 
-    Parameters
-    ----------
-    scene : coupling.Scene
-    folder : path
-    report : callable
-        Called with progress dicts.
-    threads : int or None
-    checkpoint_interval : float
-        Wall time between checkpoints [s].
-    remains : coupling.runs.resume.Remains or None
-        What to continue.
-    warn : callable
-        Called with what a user should know.
+    Arguments are those of :func:`coupling.runs.run.run`; `report` is called with progress dicts, `warn` with what a
+    user should know, and `remains` is None or a :class:`coupling.runs.resume.Remains` to continue.
     """
 
     def __init__(self, scene, folder, report, threads, checkpoint_interval, remains, warn):

@@ -27,25 +27,17 @@ def rerun(
     threads: int | None = None,
     warn: Callable[[str], None] | None = None,
 ) -> dict[str, Any]:
-    """Repeat a run in another folder and compare all that was simulated.
+    """Repeat a run, finished or not, in another folder and compare all that was simulated.
 
-    Parameters
-    ----------
-    first : str or path
-        Folder or run.nc of the run; finished or not.
-    out, progress, threads, warn
-        As of :func:`coupling.run`; `out` is ``runs/<scene>-rerun``, numbered, when None. `warn` is also told what
-        differs between then and now that the bits may depend on.
+    Further arguments are those of :func:`coupling.run`; `out` is ``runs/<scene>-rerun``, numbered, when None. `warn` is
+    also told what differs between then and now that the bits may depend on.
 
     Returns
     -------
     dict
         run, rerun (folders), changed (name to [then, now]), and the keys of :func:`compare_bits`.
 
-    Raises
-    ------
-    Refused, mpm.RunFailed, KeyboardInterrupt, OSError
-        As :func:`coupling.run`; and a run without a record.
+    Raises Refused, mpm.RunFailed, KeyboardInterrupt, OSError: as :func:`coupling.run`; and a run without a record.
     """
     file = run_file(first)
     attributes = read_attributes(file)
@@ -55,9 +47,8 @@ def rerun(
     changed = differences(attributes, root_attributes(scene), (*DECISIVE, "gmsh", "processor"))
     for name, (before, now) in changed.items():
         (warn if warn is not None else warn_in_python)(f"{name}: {before} then, {now} now; results may differ")
-    folder = run(
-        scene, default_folder(f"{scene.name}-rerun") if out is None else out, False, progress, threads, warn=warn
-    ).attrs["run"]
+    out = default_folder(f"{scene.name}-rerun") if out is None else out
+    folder = run(scene, out, progress=progress, threads=threads, warn=warn).attrs["run"]
     return {"run": str(first), "rerun": folder, "changed": changed, **compare_bits(file, folder)}
 
 

@@ -31,18 +31,10 @@ class Remains:
 def find_remains(folder, scene, warn):
     """Check the run in a folder that is held, finish a write that was cut short, and find its last good checkpoint.
 
-    Parameters
-    ----------
-    folder : path
-    scene : coupling.Scene or None
-        When given it must be that of the run.
-    warn : callable
-        Called with a message about each damaged file; it is set aside, and what came before it is used.
+    scene : None or a coupling.Scene, which must be that of the run;  warn : called with a message about each damaged
+    file, which is set aside, while what came before it is used.
 
-    Raises
-    ------
-    Refused
-        Another scene, another version of what decides the result, or a run that would fail again.
+    Raises Refused: another scene, another version of what decides the result, or a run that would fail again.
     """
     file = folder / RUN_FILE
     attributes, records = None, 0
@@ -54,7 +46,6 @@ def find_remains(folder, scene, warn):
             aside = file.with_name(f"{file.name}.damaged")
             os.replace(file, aside)
             warn(f"{damage}; it is kept as '{aside}', and the run begins anew from '{folder / SCENE_FILE}'")
-            attributes, records = None, 0
     stored = _stored_scene(folder, attributes)
     if scene is not None and scene.source != stored.source:
         raise Refused(

@@ -1,14 +1,14 @@
 """A run from scene to files: mesh, simulation written as it goes, response of the ring, pictures."""
 
-from __future__ import annotations
-
 import contextlib
 import logging
 import numbers
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import xarray as xr
 
 from coupling.datasets import opened, read_attributes, read_pressures, write_responses
 from coupling.files.checkpoint import remove_checkpoints
@@ -27,14 +27,9 @@ from coupling.runs.progress_line import ProgressLine, in_notebook
 from coupling.runs.recorded_simulation import RecordedSimulation
 from coupling.runs.resume import find_remains
 from coupling.scenes.plausibility import warn_in_python, warnings_of
-from coupling.scenes.scene import as_scene
+from coupling.scenes.scene import Scene, as_scene
 from mpm.machine.threads import check_threads
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from coupling.scenes.scene import Scene
-
+from structure import LiningFailure
 
 log = logging.getLogger("coupling.runs")
 
@@ -104,46 +99,14 @@ def run(
     _check_arguments(out, progress, threads, checkpoint_interval, warn)
     if resume and (out is None or overwrite):
         raise Refused("--resume: needs the folder of the run, and no --overwrite; give it as --out DIR")
-    given = None if scene is None else as_scene(scene)
-    if not resume:
-        if given is None:
-            raise Refused("scene: must be given unless a run is resumed; name a built-in one, as 'quick'")
-        check_memory(given)
-        out = default_folder(given.name) if out is None else out
-    held = reopened(out) if resume else claimed(out, overwrite)
-    with held as folder, _logged_to(folder / LOG_FILE), _shown(progress) as report:
-        remains = find_remains(folder, given, _teller(warn)) if resume else None
-        if remains is not None:
-            chosen: Scene = remains.scene
-            check_memory(chosen)
-        else:
-            chosen = given
-            for warning in warnings_of(chosen):
-                _teller(warn)(warning)
-        if remains is not None and remains.finished:
-            remove_checkpoints(folder)
-            pressures = read_pressures(folder)
-        else:
-            simulation = RecordedSimulation(
-                chosen, folder, report, threads, checkpoint_interval, remains, _teller(warn)
-            )
-            pressures = simulation.run()
+    tell, given = _teller(warn), None if scene is None else as_scene(scene)
+    with _held(given, out, overwrite, resume) as folder, _logged_to(folder / LOG_FILE), _shown(progress) as report:
+        chosen, pressures = _simulated(given, folder, report, threads, checkpoint_interval, resume, tell)
         failure = None
         if (figures if response is None else response) and chosen.ring is not None and chosen.tunnels:
             report({"stage": "respond"})
             failure = _answered(chosen, folder / RUN_FILE, pressures)
-        with opened(folder) as file:
-            try:
-                if figures:
-                    from coupling.figures import draw_run
-
-                    report({"stage": "figures"})
-                    draw_run(file, folder / FIGURES)
-            finally:
-                errors = stored_quality(read_attributes(file))
-                log.info("errors: %s", quality_line(errors))
-                for warning in poor_errors(errors):
-                    _teller(warn)(warning)
+        _draw_and_judge(folder, figures, report, tell)
         if failure is not None:
             drawn = " and drawn" if figures else ""
             failure.add_note(f"the ground is computed{drawn} in {folder}; change the ring, then: gush respond {folder}")
@@ -169,6 +132,48 @@ def _check_arguments(out, progress, threads, checkpoint_interval, warn):
         raise Refused(f"checkpoint_interval: must not be negative, got {checkpoint_interval!r} s; give e.g. 60")
 
 
+def _held(given, out, overwrite, resume):
+    """The folder of a run as a context, a new one checked to be worth its while."""
+    if resume:
+        return reopened(out)
+    if given is None:
+        raise Refused("scene: must be given unless a run is resumed; name a built-in one, as 'quick'")
+    check_memory(given)
+    return claimed(default_folder(given.name) if out is None else out, overwrite)
+
+
+def _simulated(given, folder, report, threads, checkpoint_interval, resume, tell):
+    """Scene and pressures of a run, computed from the beginning or on from what is there."""
+    remains = find_remains(folder, given, tell) if resume else None
+    if remains is None:
+        for warning in warnings_of(given):
+            tell(warning)
+    else:
+        check_memory(remains.scene)
+        if remains.finished:
+            remove_checkpoints(folder)
+            return remains.scene, read_pressures(folder)
+    scene = given if remains is None else remains.scene
+    simulation = RecordedSimulation(scene, folder, report, threads, checkpoint_interval, remains, tell)
+    return scene, simulation.run()
+
+
+def _draw_and_judge(folder, figures, report, tell):
+    """The pictures of a run where they are asked for, and what it says of its own errors."""
+    with opened(folder) as file:
+        try:
+            if figures:
+                from coupling.figures import draw_run
+
+                report({"stage": "figures"})
+                draw_run(file, folder / FIGURES)
+        finally:
+            errors = stored_quality(read_attributes(file))
+            log.info("errors: %s", quality_line(errors))
+            for warning in poor_errors(errors):
+                tell(warning)
+
+
 def _teller(warn):
     def tell(message):
         log.warning("%s", message)
@@ -186,8 +191,6 @@ def _shown(progress):
 
 def _answered(scene, file, pressures):
     """Store the responses of the rings; returns what refused or failed, None for nothing."""
-    from structure import LiningFailure
-
     answers, failure, attributes = {}, None, {}
     try:
         for key, response in responses_on(scene, pressures):

@@ -1,4 +1,4 @@
-"""What is computed in a scene, what is left out, and why."""
+"""What a scene is, what is computed in it, what is left out, and why, in words."""
 
 from __future__ import annotations
 
@@ -15,69 +15,84 @@ def features(scene: Scene, threads: int, why_alone: str = "one thread") -> list[
 
     scene : coupling.Scene;  threads : int;  why_alone : str, the reason where it is one.
     """
-    s, numerics = scene, scene.numerics
-    plastic = [soil.name for soil in s.soils if soil.model == "mohr-coulomb"]
-    resting = [f"{t.friction_coefficient:g}" for t in s.tunnels if t.friction_coefficient > 0]
-    resolved = s.gate is not None and s.interior == "resolved"
-    inside = "no gate: nothing can enter" if s.gate is None else "sink: what leaves the channel is counted and removed"
-    if resolved:
-        inside = "material falls, piles up, can choke the gate"
-    snapshots = s.output.snapshot_interval
-    points = f"every {snapshots:g} s" if snapshots else "only the first and the last: no snapshot_interval"
-    table = (
-        (
-            "pore water",
-            s.water is not None,
-            f"water table {s.water.table_depth:g} m below the surface" if s.water else "dry: no liquid is computed",
-        ),
-        (
-            "two velocities, of grains and water",
-            s.is_two_phase,
-            _velocities(s),
-        ),
-        (
-            "Mohr-Coulomb return mapping",
-            bool(plastic),
-            f"soils {', '.join(plastic)}" if plastic else "all soils are elastic",
-        ),
-        ("gate", s.gate is not None, f"{s.gate.width:g} m at {s.gate.angle:g} deg" if s.gate else "the scene has none"),
-        (
-            "friction on the lining",
-            bool(resting),
-            f"coefficient {', '.join(resting)}" if resting else _frictionless(s),
-        ),
-        (
-            "K0 of gravity loading",
-            any(soil.k0 is None for soil in s.soils),
-            "; ".join(f"{soil.name}: {initial_k0_text(s, soil)}" for soil in s.soils),
-        ),
-        ("slip along the lining before the gate opens", *_initial_slip(s)),
-        ("tunnel interior", resolved, inside),
-        (
-            "pressure filter",
-            numerics.pressure_filter > 0 and s.water is not None,
-            f"{numerics.pressure_filter:g} of what no node feels, a step" if numerics.pressure_filter else "set to 0",
-        ),
-        (
-            "stress damping",
-            numerics.stress_damping > 0,
-            f"stress runs ahead by {numerics.stress_damping:g} of a step" if numerics.stress_damping else "set to 0",
-        ),
-        ("motion of the lining", any(s.lining_of(t) != "fixed" for t in s.tunnels), _linings(s)),
-        ("the half x < 0", not s.is_half, _why_half(s)),
-        (
-            "snapshots of the points",
-            s.output.points,
-            points if s.output.points else "pressures and history only: output.points = false",
-        ),
-        ("several threads", threads > 1, f"{threads} threads" if threads > 1 else why_alone),
-        (
-            "ring response",
-            scene.ring is not None,
-            f"beam-spring, {len(scene.ring.joint_angles)} joints" if scene.ring else "the scene has no [ring]",
-        ),
-    )
-    return [{"feature": name, "active": bool(active), "reason": reason} for name, active, reason in table]
+    rows: list[dict[str, Any]] = []
+
+    def part(name, active, reason):
+        rows.append({"feature": name, "active": bool(active), "reason": reason})
+
+    water, gate, numerics, output, ring = scene.water, scene.gate, scene.numerics, scene.output, scene.ring
+    table = f"water table {water.table_depth:g} m below the surface" if water else "dry: no liquid is computed"
+    part("pore water", water is not None, table)
+    part("two velocities, of grains and water", scene.is_two_phase, _velocities(scene))
+    plastic = [f"{soil.name} ({soil.model})" for soil in scene.soils if soil.model != "elastic"]
+    part("plasticity of the soil", plastic, f"soils {', '.join(plastic)}" if plastic else "all soils are elastic")
+    part("gate", gate is not None, f"{gate.width:g} m at {gate.angle:g} deg" if gate else "the scene has none")
+    rough = [f"{t.friction_coefficient:g}" for t in scene.tunnels if t.friction_coefficient > 0]
+    smooth = "coefficient 0: the wall takes the normal part only" if scene.tunnels else "no tunnel"
+    part("friction on the lining", rough, f"coefficient {', '.join(rough)}" if rough else smooth)
+    k0 = "; ".join(f"{soil.name}: {initial_k0_text(scene, soil)}" for soil in scene.soils)
+    part("K0 of gravity loading", any(soil.k0 is None for soil in scene.soils), k0)
+    part("slip along the lining before the gate opens", *_initial_slip(scene))
+    inside = "sink: what leaves the channel is counted and removed"
+    inside = "material falls, piles up, can choke the gate" if scene.interior == "resolved" else inside
+    resolved = gate is not None and scene.interior == "resolved"
+    part("tunnel interior", resolved, inside if gate is not None else "no gate: nothing can enter")
+    share = numerics.pressure_filter
+    what = f"{share:g} of what no node feels, a step" if share else "set to 0"
+    part("pressure filter", share > 0 and water is not None, what)
+    ahead = numerics.stress_damping
+    part("stress damping", ahead > 0, f"stress runs ahead by {ahead:g} of a step" if ahead else "set to 0")
+    part("motion of the lining", any(scene.lining_of(t) != "fixed" for t in scene.tunnels), _linings(scene))
+    part("the half x < 0", not scene.is_half, _why_half(scene))
+    interval = output.snapshot_interval
+    kept = f"every {interval:g} s" if interval else "only the first and the last: no snapshot_interval"
+    kept = kept if output.points else "pressures and history only: output.points = false"
+    part("snapshots of the points", output.points, kept)
+    part("several threads", threads > 1, f"{threads} threads" if threads > 1 else why_alone)
+    answer = f"beam-spring, {len(ring.joint_angles)} joints" if ring else "the scene has no [ring]"
+    part("ring response", ring is not None, answer)
+    return rows
+
+
+def facts(scene: Scene) -> list[tuple[str, str]]:
+    """Numbers of a scene that an engineer asks for first: list of (what, value as text)."""
+    rows: list[tuple[str, str]] = []
+
+    def tell(what, value):
+        rows.append((what, value))
+
+    water, stop, mesh, ring = scene.water, scene.stop, scene.discretisation, scene.ring
+    tell("box", f"{scene.box.width:g} m wide, {scene.box.depth:g} m deep")
+    tell("water table", "dry ground" if water is None else f"{water.table_depth:g} m below the surface")
+    if scene.is_undrained:
+        tell("drainage", "none: water moves with the grains")
+    if water is not None:
+        tell("bulk modulus of the water", f"{water.bulk_modulus / 1e6:g} MPa")
+    for soil in scene.soils:
+        flow = ""
+        if scene.is_two_phase and soil.hydraulic_conductivity is not None:
+            flow = f", k {soil.hydraulic_conductivity:.3g} m/s"
+        room = f"porosity {soil.porosity:g} (loose {soil.loose_porosity:g})"
+        k0 = initial_k0_text(scene, soil)
+        tell(f"soil '{soil.name}' from {soil.top_depth:g} m", f"{soil.model}, {soil.in_words}, {room}, {k0}{flow}")
+    for k, tunnel in enumerate(scene.tunnels):
+        across = f"outer diameter {tunnel.outer_diameter:g} m, inner {tunnel.inner_diameter:g} m"
+        name = "tunnel" if len(scene.tunnels) == 1 else f"tunnel {k}"
+        tell(name, f"cover {tunnel.cover:g} m, {across}, friction {tunnel.friction_coefficient:g}")
+    if scene.gate is not None:
+        tell("gate in the lining", f"{1e3 * scene.gate.width:g} mm wide, {scene.gate.angle:g}° from the crown")
+    stops = [f"{stop.inflow_mass:g} kg/m of inflow"] if stop.inflow_mass is not None else []
+    stops += [f"{stop.time:g} s"] if stop.time is not None else []
+    tell("until", " or ".join(stops))
+    tell("elements", f"{mesh.element_size:g} m, at the lining {mesh.element_size_lining:g} m")
+    if ring is not None:
+        thick = f"thickness {1e3 * ring.thickness:g} mm"
+        tell("ring", f"{len(ring.joint_angles)} joints, {thick}, concrete E {ring.concrete_modulus / 1e9:g} GPa")
+        if ring.joint_angles:
+            normal, shear = ring.joint_normal_stiffness / 1e6, ring.joint_shear_stiffness / 1e6
+            turn = f"rotation {ring.joint_rotational_stiffness / 1e6:g} MN m/rad"
+            tell("joints", f"{turn}, normal {normal:g} MN/m, shear {shear:g} MN/m, a metre")
+    return rows
 
 
 def initial_k0(scene: MpmScene) -> list[dict[str, Any]]:
@@ -118,10 +133,6 @@ def _velocities(s):
     if s.is_undrained:
         return "drainage = 'undrained': water moves with the grains, no drag, no conductivity"
     return "also where they hardly differ: drag is implicit, no permeability limits the step" if s.water else "dry"
-
-
-def _frictionless(s):
-    return "coefficient 0: the wall takes the normal part only" if s.tunnels else "no tunnel"
 
 
 def _initial_slip(s):

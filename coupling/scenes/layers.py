@@ -30,20 +30,39 @@ class Layer(NamedTuple):
     data: dict[str, Any]
 
 
+def ready_names(room: str) -> list[str]:
+    """Names of what a room of `coupling` has built in, those with numbers by these."""
+    names = [entry.name.removesuffix(".toml") for entry in (resources.files("coupling") / room / "ready").iterdir()]
+    return sorted(names, key=lambda n: (n.rstrip("0123456789"), len(n), n))
+
+
 def scene_names() -> list[str]:
     """Names of the built-in scenes, `quick` first."""
-    files = resources.files("coupling") / "scenes" / "ready"
-    names = [entry.name.removesuffix(".toml") for entry in files.iterdir() if entry.name.endswith(".toml")]
-    return sorted(names, key=lambda n: (n != "quick", n.rstrip("0123456789"), len(n), n))
+    return sorted(ready_names("scenes"), key=lambda n: n != "quick")
+
+
+def text_of(kind: str, name: str, room: str, error: type[SceneError] = SceneError) -> str:
+    """TOML text of a "scene" or "study" that a room has built in, or of a file.
+
+    Raises SceneError: neither, or as :func:`read_toml_file`.
+    """
+    names = scene_names() if room == "scenes" else ready_names(room)
+    if name in names:
+        return (resources.files("coupling") / room / "ready" / f"{name}.toml").read_text(encoding="utf-8")
+    if not _is_there(Path(name)):
+        near = difflib.get_close_matches(name, names, 1)
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        raise error(
+            f"{kind} {shortened(name)}: must be a built-in {kind} or a file, got neither; {hint}"
+            f"built-in: {', '.join(names)}"
+        )
+    return read_toml_file(Path(name), f"{kind} {name!r}")
 
 
 def read_scene_data(name: str | Path) -> dict[str, Any]:
     """The nested dictionary of a scene, its bases merged, before validation; for :func:`make_scene`.
 
-    Raises
-    ------
-    SceneError
-        Unknown name or unreadable file.
+    Raises SceneError: unknown name or unreadable file.
     """
     return merged(layers_of(str(name), ()))
 
@@ -51,10 +70,7 @@ def read_scene_data(name: str | Path) -> dict[str, Any]:
 def parse_changes(texts: list[str]) -> dict[str, Any]:
     """Changes for :func:`load_scene` from texts as "gate.angle=45", "gate.width=20 cm" or "water=none".
 
-    Raises
-    ------
-    SceneError
-        A text without a name or a value.
+    Raises SceneError: a text without a name or a value.
     """
     found = {}
     for text in texts:
@@ -87,10 +103,7 @@ def change_layers(changes: dict[str, Any]) -> list[Layer]:
 def changed(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     """The nested dictionary of a scene with that of some changes merged into it, see the module's description.
 
-    Raises
-    ------
-    SceneError
-        A list is asked for an entry that it does not have.
+    Raises SceneError: a list is asked for an entry that it does not have.
     """
     merged = dict(base)
     for key, value in changes.items():
@@ -143,10 +156,7 @@ def layers_of(name: str, chain: tuple[str, ...]) -> tuple[Layer, ...]:
         )
     if len(chain) > MOST_LEVELS:
         raise SceneError(f"scene {name!r}: at most {MOST_LEVELS} bases may follow each other; merge some of the files")
-    if name in scene_names():
-        text = (resources.files("coupling") / "scenes" / "ready" / f"{name}.toml").read_text(encoding="utf-8")
-    else:
-        text = _read_file(name)
+    text = text_of("scene", name, "scenes")
     data = parse_toml(text, f"scene {name!r}")
     if not data:
         raise SceneError(f"scene {name!r}: must describe a scene, got an empty file; start from base = 'case-3'")
@@ -175,25 +185,10 @@ def _is_there(path: Path) -> bool:
         return False
 
 
-def _read_file(name: str) -> str:
-    path = Path(name)
-    if not _is_there(path):
-        near = difflib.get_close_matches(name, scene_names(), 1)
-        hint = f"did you mean {near[0]!r}? " if near else ""
-        raise SceneError(
-            f"scene {shortened(name)}: must be a built-in scene or a file, got neither; {hint}"
-            f"built-in: {', '.join(scene_names())}"
-        )
-    return read_toml_file(path, f"scene {name!r}")
-
-
 def parse_toml(text: str, who: str) -> dict[str, Any]:
     """Nested dictionary of a TOML text.
 
-    Raises
-    ------
-    SceneError
-        Not valid TOML, with the line, or nested more deeply than any scene.
+    Raises SceneError: not valid TOML, with the line, or nested more deeply than any scene.
     """
     try:
         data = tomllib.loads(text)
@@ -221,10 +216,7 @@ def check_levels(data: Any, who: str) -> None:
 def read_toml_file(path: Path, who: str) -> str:
     """Text of a file that is meant to be TOML.
 
-    Raises
-    ------
-    SceneError
-        No regular file (a device or a pipe may never end), longer than 1 MB, unreadable, or no text.
+    Raises SceneError: no regular file (a device or a pipe may never end), longer than 1 MB, unreadable, or no text.
     """
     try:
         if not path.is_file():

@@ -1,10 +1,19 @@
-"""What is told of a mistake in a scene: line of the file, key, message, and a likely wrong unit."""
+"""What is told of a mistake in a scene: line of the file, key, message, and a likely wrong unit.
 
+The line of a key is found with the parser of TOML itself: the shortest beginning of the text that has it.
+"""
+
+import re
+import tomllib
+from bisect import bisect_left
+from functools import cache
 from typing import Any
 
 from coupling.scenes.layers import Layer
-from coupling.scenes.lines import entry_at, holds, line_of, path_of
 from coupling.scenes.plausibility import shown
+
+# an error message is not worth more; a longer search gives no line
+MOST_PARSES = 300
 
 
 def mistake_line(
@@ -40,3 +49,97 @@ def _source(path: tuple[Any, ...], layers: tuple[Layer, ...]) -> tuple[Layer | N
         if list_at is not None and kept >= list_at and isinstance(entry_at(layer.data, path[:list_at]), list | tuple):
             break  # a list replaces that of a base as a whole
     return best, most
+
+
+def line_of(text: str, path: tuple[Any, ...]) -> int | None:
+    """Number of the line, from 1, on which the statement with a key begins; None where the text has no such key.
+
+    Parameters
+    ----------
+    text : str
+        Valid TOML.
+    path : tuple of str and int
+        Keys of tables and indices of lists, as ("soils", 0, "porosity").
+    """
+    lines = text.split("\n")
+
+    @cache
+    def parsed(count):
+        """Data of the first lines, None where they are no valid TOML: a statement over several lines is cut."""
+        if parsed.cache_info().misses > MOST_PARSES:
+            raise _TooLong
+        try:
+            return tomllib.loads("\n".join(lines[:count]))
+        except ValueError:
+            return None
+
+    def whole(count):
+        """The longest valid beginning of at most so many lines."""
+        return next(fewer for fewer in range(count, -1, -1) if parsed(fewer) is not None)
+
+    try:
+        if not path or not holds(parsed(len(lines)), path):
+            return None
+        return 1 + whole(bisect_left(range(len(lines)), True, key=lambda count: holds(parsed(whole(count)), path)) - 1)
+    except _TooLong:
+        return None
+
+
+def holds(data, path):
+    """Whether nested dictionaries and lists have an entry at `path`; a table may name entries of a list by number."""
+    for part in path:
+        if isinstance(data, dict):
+            part = str(part)
+            if part not in data:
+                return False
+        elif not (isinstance(data, list) and isinstance(part, int) and part < len(data)):
+            return False
+        data = data[part]
+    return True
+
+
+def path_of(message, location, data):
+    """The key that a message is about: its location, and names of tables and keys that the message mentions.
+
+    Parameters
+    ----------
+    message : str
+        As "soil 'sand': porosity must ..", "tunnel 0: ..", "gate: width ..".
+    location : tuple of str and int
+        Of the table whose check failed; empty for the whole scene.
+    data : dict
+        The scene.
+    """
+    path = tuple(location)
+    table = entry_at(data, path)
+    if not path:
+        head = re.match(r"(\w+?)s?\b(?: (?:'([^']*)'|(\d+)))?", message)
+        name, called, number = head.groups() if head else ("", None, None)
+        entries = data.get(f"{name}s")
+        if isinstance(data.get(name), dict):
+            path = (name,)
+        elif isinstance(entries, list | tuple) and (called or number) is not None:
+            names = [entry.get("name") if isinstance(entry, dict) else None for entry in entries]
+            index = int(number) if number else names.index(called) if called in names else len(entries)
+            path = (f"{name}s", index) if index < len(entries) else (f"{name}s",)
+        elif entries is not None:
+            path = (f"{name}s",)
+        table = entry_at(data, path)
+    if isinstance(table, dict):
+        key = next((word for word in re.findall(r"\w+", message) if word in table), None)
+        path = (*path, key) if key is not None else path
+    return path
+
+
+def entry_at(data, path):
+    """The entry at `path` of nested dictionaries and lists; None where there is none."""
+    for part in path:
+        try:
+            data = data[part]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return data
+
+
+class _TooLong(Exception):
+    """A text that takes too long to search."""

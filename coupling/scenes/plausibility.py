@@ -64,12 +64,7 @@ LEAST_BESIDE, LEAST_BELOW = 1.5, 1.0
 
 
 def warnings_of(scene: Scene) -> list[str]:
-    """What a user should look at again before a run: one sentence a number, empty where all is usual.
-
-    Parameters
-    ----------
-    scene : coupling.Scene
-    """
+    """What a user should look at again before a run: one sentence a number, empty where all is usual."""
     data = scene.model_dump(exclude_none=True)
     told = [f"{shown(path)} {hint}" for path, hint in hints(data).items() if not _follows(path, data)]
     told += _other_rings(scene)

@@ -1,4 +1,4 @@
-"""The ring of a tunnel: what of it follows from the ground, and those of the tunnels that [ring] does not describe."""
+"""The ring of a tunnel: its units, what of it follows from the ground, and the rings that [ring] does not describe."""
 
 from __future__ import annotations
 
@@ -7,12 +7,60 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from coupling.refused import SceneError
-from structure.inputs import mistakes
+from mpm.quantities import quantity_in
+from mpm.scene import Scene as MpmScene
+from structure.inputs import Mistake, mistakes
 from structure.ring import Ring
 
 if TYPE_CHECKING:
     from coupling.scenes.scene import Scene
-    from mpm.scene import Scene as MpmScene
+
+#: Keys of [ring], dotted, to the units of `structure.Ring`, so that they take strings with units as other tables do.
+#: A ring is one metre of tunnel: what is per metre may leave that out.
+UNITS = {
+    name: unit
+    for unit, names in {
+        "m": "outer_diameter inner_diameter joint_contact_height",
+        "degree": "joint_angles ground.friction_angle",
+        "Pa": "concrete_modulus ground.youngs_modulus ground.cohesion ground.vertical_stress ground.horizontal_stress "
+        "ground.limit_pressure_normal ground.limit_pressure_tangential",
+        "N/m**3": "concrete_unit_weight",
+        "N*m/rad/m": "joint_rotational_stiffness",
+        "N/m/m": "joint_normal_stiffness joint_shear_stiffness",
+    }.items()
+    for name in names.split()
+}
+
+
+def ring_in_si(ring: dict[str, Any], home: str = "") -> tuple[dict[str, Any], list[Mistake]]:
+    """The table [ring] with its quantities as numbers, and the mistakes among them."""
+    numbers, wrong = dict(ring), []
+    for key, value in ring.items():
+        name = f"{home}{key}"
+        if name == "ground" and isinstance(value, dict):
+            numbers[key], more = ring_in_si(value, "ground.")
+            wrong += more
+        elif name in UNITS:
+            try:
+                several = isinstance(value, list | tuple)
+                numbers[key] = [ring_number(name, entry) for entry in value] if several else ring_number(name, value)
+            except ValueError as problem:
+                wrong.append((("ring", *name.split(".")), str(problem)))
+    return numbers, wrong
+
+
+def ring_number(name: str, value: Any) -> Any:
+    """A value of [ring] as a number in its unit; `name` as "ground.cohesion".
+
+    Raises ValueError: as :func:`mpm.quantities.quantity_in`.
+    """
+    unit = UNITS.get(name)
+    if unit is None:
+        return value
+    try:
+        return quantity_in(unit.removesuffix("/m"), value)
+    except ValueError:
+        return quantity_in(unit, value)
 
 
 def gate_tunnel(scene: MpmScene) -> int:
@@ -36,10 +84,7 @@ def ring_of(scene: Scene, tunnel: int) -> Ring:
     """The ring of a tunnel: that of the scene for the tunnel with the gate (else the first), the same concrete and
     joints with the tunnel's own diameters and the ground at its own axis for any other.
 
-    Raises
-    ------
-    SceneError
-        No ring, or joints that the other diameters do not take.
+    Raises SceneError: no ring, or joints that the other diameters do not take.
     """
     if scene.ring is None:
         raise SceneError(f"scene '{scene.name}': has no [ring]; add one to get internal forces")
@@ -61,15 +106,14 @@ def ground_at_axis(scene: MpmScene, depth: float) -> dict[str, float]:
     """Soil parameters and effective stresses [Pa] at `depth` [m], for the soil springs of the ring.
 
     Vertical: :meth:`mpm.Scene.vertical_stress`; horizontal: the K0 of
-    :meth:`mpm.scene.Soil.lateral_pressure_coefficient` times that.
+    :meth:`mpm.laws.soil.Soil.lateral_pressure_coefficient` times that.
     """
     vertical = scene.vertical_stress(depth)
     here = [soil for soil in scene.soils if soil.top_depth < depth or soil is scene.soils[0]][-1]
     return {
-        "youngs_modulus": here.youngs_modulus,
+        "youngs_modulus": here.youngs_modulus_at(vertical),
         "poissons_ratio": here.poissons_ratio,
-        "cohesion": here.cohesion,
-        "friction_angle": here.friction_angle,
+        **dict(zip(("cohesion", "friction_angle"), here.strength, strict=True)),
         "vertical_stress": vertical,
         "horizontal_stress": here.lateral_pressure_coefficient(vertical) * vertical,
     }

@@ -30,8 +30,7 @@ from coupling.scenes.layers import (
 )
 from coupling.scenes.mistakes import mistake_line
 from coupling.scenes.plausibility import hints
-from coupling.scenes.ring_units import ring_in_si, ring_number, ring_unit
-from coupling.scenes.rings import derived_ring
+from coupling.scenes.rings import UNITS, derived_ring, ring_in_si, ring_number
 from mpm.quantities import quantity_in
 from mpm.scene import Scene as MpmScene
 from structure.inputs import Input, mistakes, models_in, shortened, table_html
@@ -57,7 +56,7 @@ class Scene(Input, MpmScene):
     ring: Ring | None = None
 
     def __repr__(self) -> str:
-        from coupling.scenes.facts import facts
+        from coupling.scenes.features import facts
 
         rows = facts(self)
         width = max(len(what) for what, _ in rows)
@@ -66,7 +65,7 @@ class Scene(Input, MpmScene):
     __str__ = __repr__
 
     def _repr_html_(self) -> str:
-        from coupling.scenes.facts import facts
+        from coupling.scenes.features import facts
 
         text = f"<details><summary>the complete scene</summary><pre>{html.escape(self.source)}</pre></details>"
         rows = {what: html.escape(value) for what, value in facts(self)}
@@ -158,10 +157,7 @@ def as_scene(scene: Any) -> Scene:
 
     An `mpm.Scene` is a scene without a ring.
 
-    Raises
-    ------
-    SceneError
-        As :func:`load_scene`; or what is given is neither.
+    Raises SceneError: as :func:`load_scene`; or what is given is neither.
     """
     if isinstance(scene, str | Path):
         return load_scene(scene)
@@ -179,10 +175,7 @@ def as_scene(scene: Any) -> Scene:
 def parse_scene(text: str, origin: str) -> Scene:
     """A scene from the complete TOML text that a run stores.
 
-    Raises
-    ------
-    SceneError
-        As :func:`load_scene`.
+    Raises SceneError: as :func:`load_scene`.
     """
     layer = Layer(origin, text, parse_toml(text, f"scene {origin!r}"))
     return make_scene(layer.data, origin, (layer,))
@@ -217,9 +210,7 @@ def make_scene(data: dict[str, Any], origin: str = "scene", layers: tuple[Layer,
         layers = (*layers, *below)
     whole, data = data, dict(data)
     ring_data = data.pop("ring", None)
-    problems = _truth_values(data, MpmScene, ())
-    if isinstance(ring_data, dict):
-        problems += _truth_values(ring_data, Ring, ("ring",))
+    problems = _truth_values(whole, Scene, ())
     ground = ring = None
     try:
         ground = MpmScene.model_validate(data)
@@ -256,29 +247,26 @@ def make_scene(data: dict[str, Any], origin: str = "scene", layers: tuple[Layer,
 def number_in_unit(name: str, value: Any) -> Any:
     """A string with a unit as the number that the key of that dotted name takes; anything else as it is.
 
-    Raises
-    ------
-    ValueError
-        As :func:`mpm.quantities.quantity_in`.
+    Raises ValueError: as :func:`mpm.quantities.quantity_in`.
     """
-    parts = _without_numbers(name)
-    if parts[0] == "ring":
-        return ring_number(tuple(parts), value)
+    if name.startswith("ring."):
+        return ring_number(".".join(_without_numbers(name)[1:]), value)
     unit = unit_of(name)
     return value if unit is None else quantity_in(unit, value)
 
 
 def unit_of(name: str) -> str | None:
     """Unit of the key of a dotted name, as pint reads it; None where it has none, or where there is no such key."""
-    parts = _without_numbers(name)
-    if parts[0] == "ring":
-        return ring_unit(tuple(parts))
+    *tables, key = _without_numbers(name)
+    if tables[:1] == ["ring"]:
+        return UNITS.get(".".join([*tables[1:], key]))
     try:
         model = MpmScene
-        for part in parts[:-1]:
-            model = next(models_in(model.model_fields[part].annotation))
-        field = model.model_fields[parts[-1]]
-    except (KeyError, StopIteration):
+        for table in tables:
+            models = list(models_in(model.model_fields[table].annotation))  # of soils one a law
+            model = next((each for each in models if key in each.model_fields), models[0])
+        field = model.model_fields[key]
+    except (KeyError, IndexError):
         return None
     kinds = (field, *getattr(field.annotation, "__args__", ()))
     metadata = [each for kind in kinds for each in getattr(kind, "metadata", getattr(kind, "__metadata__", ()))]

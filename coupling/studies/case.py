@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-#: In a case's folder: what of it goes into the study's dataset, written last, so it exists only when all is done.
-CASE_FILE = "case.nc"
-RUN_FOLDER = "run"
+from coupling.studies.folder import CASE_FILE, RUN_FOLDER
+from coupling.studies.progress import CaseProgress
+
 #: Quantities over time that a case keeps besides pressures and response.
 PROGRESS = ("time", "flow_zone_area", "disturbed_area", "suspended_fraction", "max_velocity")
 
 
 def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, threads: int = 1) -> str:
-    """Run one scene and write its `case.nc`; at once where that exists.
+    """Run one scene and write its `case.nc`, at once where that exists; returns the path of the file.
 
     Parameters
     ----------
@@ -29,17 +29,9 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, 
     threads : int
         Results do not depend on it.
 
-    Returns
-    -------
-    str
-        Path of the file.
-
-    Raises
-    ------
-    mpm.RunFailed, structure.LiningFailure, coupling.refused.Refused
-        As :func:`coupling.run`; the study goes on without the case.
+    Raises mpm.RunFailed, structure.LiningFailure, coupling.refused.Refused: as :func:`coupling.run`; the study goes on
+    without the case.
     """
-
     from coupling.datasets import read_history, read_pressures, write_dataset, write_responses
     from coupling.datasets.geometry import on_tunnel
     from coupling.files.folder import RUN_FILE
@@ -49,7 +41,6 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, 
     from coupling.responses.respond import responses_on
     from coupling.runs.run import run
     from coupling.scenes.scene import parse_scene
-    from coupling.studies.progress import CaseProgress
     from structure.models import lining_model, model_name
 
     place = Path(folder)
@@ -117,24 +108,15 @@ def at_inflow_masses(pressures, history, responses, masses):
         models = [_at(response[keep], reached) for response in responses.values()]
         parts.append(xr.concat(models, dim=xr.IndexVariable("model", list(responses)), join="outer"))
     result = xr.merge(parts, compat="no_conflicts", join="outer")
-    result["time"] = (
-        "progress",
-        np.where(unique, reached, np.nan),
-        {"units": "s", "long_name": "time since the gate opened"},
-    )
+    share = masses / max(masses[-1], 1e-300)
     result = result.assign_coords(
-        progress=(
-            "progress",
-            masses / max(masses[-1], 1e-300),
-            {"units": "1", "long_name": "share of the last inflow mass"},
-        ),
+        progress=("progress", share, {"units": "1", "long_name": "share of the last inflow mass"}),
         inflow_mass=("progress", masses, {"units": "kg/m", "long_name": "grains inside the tunnel"}),
     )
-    result["cpu_seconds"] = (
-        (),
-        float(history["cpu_seconds"].values[-1]),
-        {"units": "s", "long_name": "processor time"},
-    )
+    about = {"units": "s", "long_name": "time since the gate opened"}
+    result["time"] = ("progress", np.where(unique, reached, np.nan), about)
+    used = float(history["cpu_seconds"].values[-1])
+    result["cpu_seconds"] = ((), used, {"units": "s", "long_name": "processor time"})
     values = quality(history, next(iter(responses.values()), None)) if set(BALANCES) <= set(history) else {}
     for name, value in values.items():
         if name != "clamps":

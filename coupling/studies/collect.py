@@ -1,21 +1,19 @@
 """All cases of a study in one dataset."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from coupling.datasets.group import read_group_at_once
 from coupling.files.provenance import origin, with_history
 from coupling.scenes.scene import unit_of
-from coupling.studies.design import Case, Study, StudyError
-
-if TYPE_CHECKING:
-    import xarray as xr
+from coupling.studies.cases import Case, cases
+from coupling.studies.design import Study, StudyError, stored_study
+from coupling.studies.folder import STATUS_FILE, case_file
+from structure.lining import at_whole_degrees
 
 #: Studies whose cases take less than this on the disk are held in memory.
 MOST_BYTES_IN_MEMORY = 5e8
@@ -27,22 +25,13 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     Returns
     -------
     xarray.Dataset
-        Variables of :func:`coupling.studies.case.at_inflow_masses` with `case` in front; parameters as coordinates
-        (case) in SI under their dotted names with `_` for `.`, and `case_name`; `status` (case) "finished" or
-        "failed", `message` (case);
-        failed cases are NaN. Attributes: `study`, its definition as JSON with the seed; `failed`, their number; source,
-        revision, versions.
+        Variables of :func:`coupling.studies.case.at_inflow_masses` with `case` in front, NaN in failed cases;
+        parameters as coordinates (case) in SI under their dotted names with `_` for `.`, and `case_name`; `status`
+        (case) "finished" or "failed", `message` (case). Attributes: `study`, its definition as JSON with the seed;
+        `failed`, their number; source, revision, versions.
 
-    Raises
-    ------
-    coupling.studies.design.StudyError
-        The file of a case is damaged.
+    Raises coupling.studies.design.StudyError: the file of a case is damaged.
     """
-    import xarray as xr
-
-    from coupling.studies.execute import case_file
-    from structure.lining import at_whole_degrees
-
     there = [case for case in cases if case_file(folder, case).is_file()]
     parts, files = [], [case_file(folder, case) for case in there]
     small = sum(file.stat().st_size for file in files) < MOST_BYTES_IN_MEMORY
@@ -55,14 +44,13 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
             parts.append(at_whole_degrees(part, "theta_ring"))  # as earlier versions called the angles of the ring
         except (OSError, RuntimeError, ValueError, KeyError, AttributeError) as error:
             raise StudyError(unreadable(file, error)) from None
+    result = xr.Dataset(coords={"case": np.array([], int)})
     if parts:
         result = xr.concat(
             parts, dim=xr.IndexVariable("case", [case.index for case in there]), join="outer", data_vars="all",
             coords=["inflow_mass"], compat="override", combine_attrs="drop_conflicts",
         )  # fmt: skip
-        result = result.reindex(case=[case.index for case in cases])
-    else:
-        result = xr.Dataset(coords={"case": [case.index for case in cases]})
+    result = result.reindex(case=[case.index for case in cases])
     result["case"].attrs = {"units": "1", "long_name": "number of the case"}
     names = np.array([case.name for case in cases], dtype=str)
     result = result.assign_coords(case_name=("case", names, {"long_name": "what the case changes"}))
@@ -115,9 +103,9 @@ def _of_scenes(cases):
         "gate_angle": ([np.nan if gate is None else gate.angle for gate in gates], "degree", "angle of the gate"),
         "cover": ([t[0].cover if t else np.nan for t in tunnels], "m", "cover of the first tunnel"),
         "soil": ([soil.name for soil in soils], "1", "uppermost soil"),
-        "cohesion": ([soil.cohesion for soil in soils], "Pa", "its cohesion"),
-        "friction_angle": ([soil.friction_angle for soil in soils], "degree", "its friction angle"),
-        "youngs_modulus": ([soil.youngs_modulus for soil in soils], "Pa", "its Young's modulus"),
+        "cohesion": ([soil.strength[0] for soil in soils], "Pa", "its cohesion"),
+        "friction_angle": ([soil.strength[1] for soil in soils], "degree", "its friction angle"),
+        "youngs_modulus": ([soil.youngs_modulus_at(1e5) for soil in soils], "Pa", "its Young's modulus, under 100 kPa"),
     }
     return {
         name: ("case", np.array(values), {"units": units, "long_name": text})
@@ -128,14 +116,8 @@ def _of_scenes(cases):
 def stored_cases(folder: str | Path) -> tuple[Study, list[Case], dict[str, str]]:
     """Definition, cases and failures of a study that ran earlier, also by an earlier version of the program.
 
-    Raises
-    ------
-    coupling.studies.design.StudyError
-        No study there, or its files are damaged.
+    Raises coupling.studies.design.StudyError: no study there, or its files are damaged.
     """
-    from coupling.studies.design import cases, stored_study
-    from coupling.studies.execute import STATUS_FILE
-
     folder = Path(folder)
     plan = stored_study(folder)
     found = cases(plan)

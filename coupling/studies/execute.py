@@ -12,8 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coupling.files.replace import replace_file
-from coupling.studies.case import CASE_FILE, run_case
-from coupling.studies.design import STUDY_FILE, Case, Study, StudyError, cases, check_backends, is_folder, load_study
+from coupling.studies.case import run_case
+from coupling.studies.cases import cases, check_backends
+from coupling.studies.design import Study, StudyError, is_folder, load_study
+from coupling.studies.folder import CASES, STATUS_FILE, STUDY_FILE, case_file
 from coupling.studies.progress import StudyState, watching
 
 if TYPE_CHECKING:
@@ -24,8 +26,7 @@ LOSSES = 3
 #: Workers that were lost are started again within seconds [s].
 LONGEST_WITHOUT_WORKERS = 60.0
 #: What collecting and storing the cases loads; loaded while the workers load what they need.
-COLLECTING = ("xarray", "structure.lining", "pint", "h5netcdf", "dask.array")
-CASES, STATUS_FILE, DATA_FILE = "cases", "status.json", "study.nc"
+COLLECTING = ("coupling.studies.collect", "structure.lining", "pint", "dask.array")
 
 
 def study(
@@ -66,8 +67,6 @@ def study(
     StudyError
         Before anything runs: an invalid study or scene, or a folder that cannot be used.
     """
-    from coupling.studies.collect import collect
-
     _check_arguments(out, workers)
     plan = load_study(what)
     check_backends(plan)
@@ -93,12 +92,12 @@ def study(
         except KeyboardInterrupt as stop:
             stop.add_note(f"what is done is kept; go on with: gush study {folder}")
             raise
-    status = {
-        case.key: {"parameters": case.parameters, "status": "failed" if case.key in failures else "finished",
-                   "message": failures.get(case.key, "")}
-        for case in todo
-    }  # fmt: skip
+    failed = {key: {"status": "failed", "message": message} for key, message in failures.items()}
+    finished = {"status": "finished", "message": ""}
+    status = {case.key: {"parameters": case.parameters, **failed.get(case.key, finished)} for case in todo}
     _write_json(folder / STATUS_FILE, status)
+    from coupling.studies.collect import collect  # by now loaded beside the workers
+
     return collect(plan, todo, folder, failures)
 
 
@@ -115,11 +114,6 @@ def _check_arguments(out, workers):
     whole = isinstance(workers, numbers.Integral) and not isinstance(workers, bool)
     if workers is not None and not (whole and workers >= 0):
         raise StudyError(f"workers: must be a whole number from 0, got {workers!r}; leave it out for one a core")
-
-
-def case_file(folder: Path, case: Case) -> Path:
-    """Where the results of a case are once it is done."""
-    return folder / CASES / case.key / CASE_FILE
 
 
 def _run(plan, missing, folder, workers, scheduler):
@@ -152,27 +146,36 @@ def _in_this_process(plan, missing, folder, threads):
 def _in_processes(plan, missing, folder, count, threads):
     from coupling.studies.pool import Pool, WorkerLost
 
-    calls = {case.key: _arguments(plan, case, folder, threads) for case in missing}
-    found = {case.key: case for case in missing}
-    losses: dict[str, int] = {}
-    with Pool(count) as pool:
-        for module in COLLECTING:
-            import_module(module)
-        for key, ended in pool.run(run_case, calls):
-            if isinstance(ended, WorkerLost):
-                losses[key] = 1
-            else:
-                yield found[key], ended
-        if not losses:
-            return
-    # what lost its process again, with nothing beside it, so that a further loss is its own doing
-    with Pool(1) as pool:
-        while losses:
-            for key, ended in pool.run(run_case, {key: calls[key] for key in losses}):
-                losses[key] += 1
-                if not isinstance(ended, WorkerLost) or losses[key] == LOSSES:
-                    yield found[key], _text(ended) if isinstance(ended, WorkerLost) else ended
-                    del losses[key]
+    def run(cases):
+        found = {case.key: case for case in cases}
+        calls = {key: _arguments(plan, case, folder, threads) for key, case in found.items()}
+        with Pool(min(count, len(cases))) as pool:
+            for module in COLLECTING:
+                import_module(module)
+            for key, ended in pool.run(run_case, calls):
+                lost = isinstance(ended, WorkerLost)
+                yield found[key], _text(ended) if lost else ended, lost
+
+    yield from _outlasting_losses(run, missing)
+
+
+def _outlasting_losses(run, missing):
+    """Cases and their failures as they end; `run` yields of some cases also whether their worker was lost.
+
+    What lost its worker is run again with nothing beside it, so that a further loss is its own doing.
+    """
+    again = []
+    for case, failure, lost in run(missing):
+        if lost:
+            again.append(case)
+        else:
+            yield case, failure
+    for case in again:
+        for _ in range(LOSSES - 1):
+            ((_, failure, lost),) = run([case])
+            if not lost:
+                break
+        yield case, failure
 
 
 def _on_cluster(plan, missing, folder, scheduler):
@@ -181,20 +184,13 @@ def _on_cluster(plan, missing, folder, scheduler):
 
     # Every loss of a worker comes back here at once: the scheduler would blame all cases that waited on it.
     with dask.config.set({"distributed.scheduler.allowed-failures": 0}), Client(scheduler) as client:
-        lost = []
         at_once = sum(worker["nthreads"] for worker in client.scheduler_info(n_workers=-1)["workers"].values())
-        for case, failure in _submitted(client, plan, missing, folder, max(at_once, 1)):
-            if isinstance(failure, _lost()):
-                lost.append(case)
-            else:
-                yield case, _text(failure)
-        for case in lost:
-            yield case, _alone(client, plan, case, folder)
+        yield from _outlasting_losses(lambda cases: _submitted(client, plan, cases, folder, max(at_once, 1)), missing)
 
 
 def _submitted(client, plan, todo, folder, at_once):
-    """Cases and their failures (or None) as they end, never more of them in work than there are threads."""
-    from distributed import as_completed
+    """Cases, their failures and whether their worker was lost, never more of them in work than there are threads."""
+    from distributed import CancelledError, KilledWorker, as_completed
 
     waiting = list(reversed(todo))
     running = {}
@@ -215,16 +211,14 @@ def _submitted(client, plan, todo, folder, at_once):
         failure = future.exception()
         if waiting:
             submit()
-        yield case, failure
+        yield case, _text(failure), isinstance(failure, KilledWorker | CancelledError)
 
 
 def _wait(client, pool):
     """Until a case has ended.
 
-    Raises
-    ------
-    StudyError
-        When no worker has been there for a while: a case that was given to none would be waited for in vain.
+    Raises StudyError: when no worker has been there for a while: a case that was given to none would be waited for in
+    vain.
     """
     seen = clock.monotonic()
     while not pool.has_ready():
@@ -236,21 +230,6 @@ def _wait(client, pool):
                 f"study: no worker has been there for {LONGEST_WITHOUT_WORKERS:g} s; what is done is kept, repeat the "
                 "command to go on"
             )
-
-
-def _alone(client, plan, case, folder):
-    """Run a case whose worker was lost with nothing beside it, so that a further loss is its own doing."""
-    for _ in range(LOSSES - 1):
-        (_, failure) = next(_submitted(client, plan, [case], folder, 1))
-        if not isinstance(failure, _lost()):
-            break
-    return _text(failure)
-
-
-def _lost():
-    from distributed import CancelledError, KilledWorker
-
-    return KilledWorker, CancelledError
 
 
 def _text(failure):

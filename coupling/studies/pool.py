@@ -24,12 +24,7 @@ class WorkerLost(RuntimeError):
 
 
 class Pool:
-    """Processes that run calls, from now until the block ends.
-
-    Parameters
-    ----------
-    count : int
-    """
+    """So many processes that run calls, from now until the block ends."""
 
     def __init__(self, count: int):
         self._families, self._idle = [], []

@@ -11,21 +11,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from coupling.files.replace import replace_file
+from coupling.studies.folder import CASE_FILE, PROGRESS_FILE
 
-PROGRESS_FILE = "progress.json"
 SECONDS_BETWEEN_STATES = 1.0
 #: A case that has not written for so long is taken for lost; the slowest stage between two states takes some seconds.
 SECONDS_UNTIL_LOST = 120.0
 
 
 class CaseProgress:
-    """Writes the state of one case, about once a second; callable with the progress dicts of :func:`coupling.run`.
-
-    Parameters
-    ----------
-    folder : path
-        Of the case.
-    """
+    """Writes the state of one case into its folder, about once a second; callable with progress dicts of a run."""
 
     def __init__(self, folder: Path):
         self._path, self._last = Path(folder) / PROGRESS_FILE, -1e9
@@ -68,17 +62,8 @@ class StudyState:
 def study_state(folder: Path, numbers: dict[str, int], failures: dict[str, str]) -> StudyState:
     """Read the state of all cases from their folders.
 
-    Parameters
-    ----------
-    folder : path
-        That holds the cases' folders.
-    numbers : dict of str to int
-        Key of a case to its number.
-    failures : dict of str to str
-        Keys of those that have failed.
+    folder : that holds those of the cases;  numbers : key of a case to its number;  failures : by keys.
     """
-    from coupling.studies.case import CASE_FILE
-
     done, running = 0, {}
     for key, number in numbers.items():
         place = folder / key
@@ -114,12 +99,7 @@ def watching(folder, numbers, failures, watch: Callable[[StudyState], None] | No
 
 
 class StudyLine:
-    """The live lines of a study, on a terminal only: the whole, and every case at work.
-
-    Parameters
-    ----------
-    console : rich.console.Console
-    """
+    """The live lines of a study on a console of rich, if it is a terminal: the whole, and every case at work."""
 
     def __init__(self, console):
         from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn

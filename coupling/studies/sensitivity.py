@@ -7,12 +7,15 @@ nor the base of a one-at-a-time study. Of a linear function the squares of the e
 indices.
 """
 
-from __future__ import annotations
-
 import json
 
+import matplotlib
 import numpy as np
+import xarray as xr
+from scipy.stats import spearmanr
 
+from coupling.figures import STYLE
+from coupling.figures.picture import Picture
 from coupling.studies.design import AS_IT_IS
 
 #: Fewest values of which a rank correlation says anything.
@@ -50,8 +53,6 @@ def sensitivity(study, quantity):
         Fewer than three finished cases, no parameter with two different values, or a one-at-a-time study without
         its base.
     """
-    import xarray as xr
-
     values = np.asarray(quantity.values, float)
     if quantity.dims != ("case",):
         raise ValueError(f"quantity: must have the dimension (case,), got {quantity.dims}; select a state and a place")
@@ -134,8 +135,6 @@ def _own_cases(parameters, name, base):
 
 def _effect(parameter, values, alone):
     """Rank correlation, its p-value, low and high of :func:`sensitivity`, over the cases of one parameter."""
-    from scipy.stats import spearmanr
-
     different = np.unique(parameter)
     if parameter.dtype.kind != "f":
         means = [values[parameter == each].mean() for each in different]
@@ -164,11 +163,6 @@ def tornado(result, label: str = "", scale: float = 1.0):
     -------
     matplotlib.figure.Figure
     """
-    import matplotlib
-
-    from coupling.figures import STYLE
-    from coupling.figures.picture import Picture
-
     with matplotlib.rc_context(STYLE):
         names = result["parameter"].values[::-1]
         figure = Picture(figsize=(5.6, 1.0 + 0.32 * len(names)), layout="constrained")
@@ -202,11 +196,6 @@ def scatter(study, quantity, label: str = "", scale: float = 1.0):
     -------
     matplotlib.figure.Figure
     """
-    import matplotlib
-
-    from coupling.figures import STYLE
-    from coupling.figures.picture import Picture
-
     names = [str(name) for name in sensitivity(study, quantity)["parameter"].values]
     parameters = parameters_of(study)
     with matplotlib.rc_context(STYLE):

@@ -24,8 +24,10 @@ def run_study(name, out, workers, scheduler, console):
         axial_force [N/m] and bending_moment [N m/m] of that model as {max, min}, None without a ring.
     """
     from coupling.datasets import write_dataset
-    from coupling.studies.design import cases, load_study
-    from coupling.studies.execute import DATA_FILE, study, study_folder
+    from coupling.studies.cases import cases
+    from coupling.studies.design import load_study
+    from coupling.studies.execute import study, study_folder
+    from coupling.studies.folder import DATA_FILE
     from coupling.studies.progress import StudyLine
 
     plan = load_study(name)

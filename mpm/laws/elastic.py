@@ -48,6 +48,11 @@ class Elastic(Soil):
         return {"lame": 2 * shear * self.poissons_ratio / (1 - 2 * self.poissons_ratio), "shear": shear}
 
     @property
+    def in_words(self):
+        """Elastic parameters."""
+        return f"E {self.youngs_modulus / 1e6:g} MPa, ν {self.poissons_ratio:g}"
+
+    @property
     def strength(self):
         """Cohesion [Pa] and friction angle [deg]."""
         return self.cohesion, self.friction_angle

@@ -11,7 +11,6 @@ from types import FunctionType
 from typing import Any
 
 import numpy as np
-
 from pydantic_core import PydanticCustomError, ValidationError
 
 from mpm.laws.soil import Soil

@@ -123,6 +123,13 @@ class ModifiedCamClay(Soil):
         return 6 * sine / (3 - sine)
 
     @property
+    def in_words(self):
+        """Indices, critical state friction, overconsolidation."""
+        indices = f"λ {self.compression_index:g}, κ {self.swelling_index:g}, ν {self.poissons_ratio:g}"
+        angle = f"φ'cs {self.critical_state_friction_angle:g}°"
+        return f"{indices}, {angle}, OCR {self.overconsolidation_ratio:g}, attraction {self.attraction / 1e3:g} kPa"
+
+    @property
     def constants(self):
         """M, kappa, lambda - kappa, shear over bulk modulus, attraction."""
         nu = self.poissons_ratio

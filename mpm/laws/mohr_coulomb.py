@@ -186,6 +186,12 @@ class MohrCoulomb(Elastic):
         }
 
     @property
+    def in_words(self):
+        """Elastic parameters and strength."""
+        strength = f"c' {self.cohesion / 1e3:g} kPa, φ' {self.friction_angle:g}°, ψ {self.dilatancy_angle:g}°"
+        return f"{super().in_words}, {strength}"
+
+    @property
     def limits(self):
         """Friction angle and cohesion in words."""
         return f"friction_angle {self.friction_angle:g} deg and cohesion {self.cohesion:g} Pa"

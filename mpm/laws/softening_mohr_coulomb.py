@@ -72,6 +72,13 @@ class SofteningMohrCoulomb(MohrCoulomb):
         return self
 
     @property
+    def in_words(self):
+        """Elastic parameters, peak and residual strength."""
+        angles = f"φ' {self.residual_friction_angle:g}°, ψ {self.residual_dilatancy_angle:g}°"
+        residual = f"c' {self.residual_cohesion / 1e3:g} kPa, {angles}"
+        return f"{super().in_words}, beyond a plastic strain of {self.softening_strain:g} {residual}"
+
+    @property
     def constants(self):
         """Those of the peak, and what changes on the way to the residual strength (angles in radians)."""
         peak, residual = self.friction_angle, self.residual_friction_angle

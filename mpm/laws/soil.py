@@ -108,6 +108,11 @@ class Soil(Part):
         raise NotImplementedError
 
     @property
+    def in_words(self) -> str:
+        """The law's parameters in a few words with units."""
+        return f"ν {self.poissons_ratio:g}"
+
+    @property
     def limits(self) -> str:
         """What of the law limits K0, in words with values; shown where K0 is refused."""
         return f"the law '{self.model}' of the soil"

@@ -19,8 +19,9 @@ from coupling.datasets import read_response
 from coupling.studies import case as case_module
 from coupling.studies import execute
 from coupling.studies.case import at_inflow_masses
+from coupling.studies.cases import cases
 from coupling.studies.collect import units_of
-from coupling.studies.design import Study, StudyError, cases, load_study, study_names
+from coupling.studies.design import Study, StudyError, load_study, study_names
 from coupling.studies.pool import Pool
 from coupling.studies.progress import CaseProgress, study_state
 from coupling.studies.sensitivity import scatter, sensitivity, tornado

@@ -1,6 +1,7 @@
 """Which package may import which, and what a light import may load."""
 
 import ast
+import graphlib
 import subprocess
 import sys
 from pathlib import Path
@@ -22,10 +23,13 @@ ROOMS = (
 HEAVY = ("numba", "xarray", "matplotlib", "scipy", "gmsh", "skfem", "pint", "dask", "distributed", "h5py", "meshio")
 
 
-def imported(path: Path) -> set[str]:
-    """Modules a file imports anywhere, inside functions and by name too."""
-    names = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+def imported(path: Path, executed: bool = False) -> set[str]:
+    """Modules a file imports anywhere, inside functions and by name too; `executed`: not for its annotations alone."""
+    names, nodes = set(), list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    if executed:
+        typed = [node for node in nodes if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)]
+        nodes = [node for node in nodes if not any(node in ast.walk(block) for block in typed)]
+    for node in nodes:
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -54,6 +58,18 @@ def test_rooms_import_only_those_before_them(room):
     later = {f"coupling.{name}" for name in ROOMS[ROOMS.index(room) + 1 :]}
     wrong = {path.name: later & {".".join(name.split(".")[:2]) for name in imported(path)} for path in files}
     assert not {path: names for path, names in wrong.items() if names}
+
+
+@pytest.mark.parametrize("package", FORBIDDEN)
+def test_no_module_imports_itself_by_way_of_others(package):
+    files = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
+        for path in (ROOT / package).rglob("*.py")
+    }
+    # `coupling` and the like give names that load on first use: who imports from them imports the home of the name
+    found = {name: imported(path, executed=True) - {name} for name, path in files.items() if name != package}
+    graph = {name: {other for other in others if other in found} for name, others in found.items()}
+    tuple(graphlib.TopologicalSorter(graph).static_order())  # a CycleError names the circle
 
 
 def test_every_module_of_coupling_is_in_a_room():

@@ -101,7 +101,8 @@ def read_toml(block):
         assert FILE_NAME.fullmatch(block.title), f"{block.place}: title must be a file name, got {block.title!r}"
         Path(block.title).write_text(block.text, encoding="utf-8")
     if "parameters" in data:
-        from coupling.studies.design import cases, load_study
+        from coupling.studies.cases import cases
+        from coupling.studies.design import load_study
 
         assert cases(load_study(data)), block.place
     elif "base" in data:

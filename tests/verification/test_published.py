@@ -167,7 +167,7 @@ def test_study_at_an_inflow_mass_is_unknown_beyond_what_was_run():
 
 
 def test_full_study_has_the_published_stops_and_a_rehearsal_is_coarse():
-    from coupling.studies.design import cases
+    from coupling.studies.cases import cases
 
     full, rehearsed = plans(), plans(coarse=True)
     assert len(cases(full[0])) == 10 and full[0].backends == ("beam-spring", "continuum")

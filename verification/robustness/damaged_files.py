@@ -128,7 +128,8 @@ def scene_content(path):
 
 def study_content(path):
     """A study file and its cases."""
-    from coupling.studies.design import cases, load_study
+    from coupling.studies.cases import cases
+    from coupling.studies.design import load_study
 
     return {"cases": str([case.key for case in cases(load_study(str(path)))])}
 

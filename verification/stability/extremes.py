@@ -74,7 +74,7 @@ def judge_apart(case, limit=LIMIT):
     """Run a case in a process of its own, which ends after `limit` seconds; a crash or a hang is a bug."""
     context = multiprocessing.get_context("spawn")
     results = context.Queue()
-    process = context.Process(target=_send, args=(case.name, results))
+    process = context.Process(target=_send, args=(case, results))
     begin = clock.monotonic()
     process.start()
     outcome = None
@@ -93,10 +93,8 @@ def judge_apart(case, limit=LIMIT):
     return outcome
 
 
-def _send(name, results):
-    from verification.stability.cases import cases
-
-    results.put(judge(cases()[name]))
+def _send(case, results):
+    results.put(judge(case))
 
 
 def _message(error):
