@@ -251,11 +251,6 @@ class ContinuumMesh:
                 column[index], place[index] = best, share[best]
         return column, place
 
-    def neighbour_place(self) -> np.ndarray:
-        """(n_lines,) place of each line when the ring is folded flat, which closes it inside a narrow band."""
-        line = np.arange(self.n_lines)
-        return np.where(2 * line < self.n_lines, 2 * line, 2 * (self.n_lines - line) - 1)
-
 
 def _layer_edges(ring: Ring, layers: int, groove: GasketGroove | None) -> np.ndarray:
     """Radii between the layers: even, but lines at the edges of the groove."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from structure.beam_geometry import arc_pieces, sampled_operator
-from structure.continuum_mesh import EDGE_MEAN, ContinuumMesh
-from structure.continuum_sections import column_means, edge_shapes
+from structure.arcs import arc_pieces, sampled_operator
+from structure.continuum.mesh import EDGE_MEAN, ContinuumMesh
+from structure.continuum.sections import column_means, edge_shapes
 from structure.ring import Ring
 
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from structure.continuum_mesh import ContinuumMesh
-from structure.continuum_stiffness import STRESS_POINTS, StressOperators
+from structure.continuum.concrete import STRESS_POINTS, StressOperators
+from structure.continuum.mesh import ContinuumMesh
 
 
 def section_forces(

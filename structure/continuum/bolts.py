@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from structure.continuum_mesh import ContinuumMesh
-from structure.continuum_sections import edge_shapes
+from structure.continuum.mesh import ContinuumMesh
+from structure.continuum.sections import edge_shapes
 from structure.ring import Ring
 
 

@@ -1,0 +1,241 @@
+"""What all lining models of finite elements share: loads, equilibrium, balances, movements and the response.
+
+A model makes matrices of its ring once (:class:`structure.ring_forces.RingParts`), says how forces and displacements
+are read from its unknowns (:class:`Readings`) and what tractions on its outer face do; the rest is here.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from scipy import sparse
+from threadpoolctl import threadpool_limits
+
+from structure.balance import borne, even_loads, without_unborne
+from structure.lining import LiningFailure, LiningModel, response_dataset, ring_attributes
+from structure.newton import NoEquilibrium, RingEquilibrium
+from structure.pressures import check_pressures
+from structure.response import FORCES
+from structure.ring import Ring
+from structure.ring_forces import RingParts
+
+#: Both sides of an angle [rad]: at a joint the mean of the two is given.
+SIDES = (-1e-9, 1e-9)
+
+
+class Stations(NamedTuple):
+    """Where Q + dM/ds + couple = 0 is checked: between stations around the ring and the ones after them.
+
+    angle : (n,) float64, of the stations, ascending [rad].
+    shear, moment : (n, n_unknowns) sparse, Q and M there.
+    middle : (n,) float64, the places between [rad].
+    share : (n,) float64, of the station before in Q at the middle.
+    slip : (n, n_springs) sparse, mean tangential reaction at the middle.
+    lined : (n,) float64, share of the tunnel's length that is lined there.
+    couple : (n,) float64, further clockwise couple per arc of the centre line [N].
+    judged : (n,) bool, False near forces that are concentrated.
+    """
+
+    angle: np.ndarray
+    shear: sparse.csr_array
+    moment: sparse.csr_array
+    middle: np.ndarray
+    share: np.ndarray
+    slip: sparse.csr_array
+    lined: np.ndarray
+    couple: np.ndarray
+    judged: np.ndarray
+
+
+class Readings(NamedTuple):
+    """How a response is read from n unknowns, at the angles :data:`structure.lining.THETA`.
+
+    forces : N, Q and M, (n_theta, n) sparse each.
+    movement : radial and tangential displacement, (n_theta, n) sparse each.
+    quarters : (4, n) sparse, radial displacement at crown, right waist, invert and left waist.
+    lined : (n_theta,) bool, False where there is no lining: forces and displacements there are NaN.
+    stations : Stations
+    """
+
+    forces: tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array]
+    movement: tuple[sparse.csr_array, sparse.csr_array]
+    quarters: sparse.csr_array
+    lined: np.ndarray
+    stations: Stations
+
+
+class States(NamedTuple):
+    """Equilibrium at every time: loads on the unknowns, displacements (n_times, n), slips of the joints before
+    (n_times, n_joints), reactions of the soil springs (n_times, n_springs); balanced uplift, unborne share (n_times,).
+    """
+
+    loads: np.ndarray
+    displacements: np.ndarray
+    slips: np.ndarray
+    reactions: np.ndarray
+    balanced: np.ndarray
+    unborne: np.ndarray
+
+
+class DiscreteLining(LiningModel):
+    """A lining model of finite elements, in equilibrium with its loads by Newton's method.
+
+    Parameters
+    ----------
+    ring : Ring
+    parts : RingParts
+    readings : Readings
+
+    Notes
+    -----
+    Soil springs start unstressed at the undeformed ring: the pressures given are what the soil exerts there, and the
+    springs add what the ring's displacement mobilises.
+    """
+
+    def __init__(self, ring: Ring, parts: RingParts, readings: Readings):
+        self.ring, self.parts, self.readings = ring, parts, readings
+        self._equilibrium = RingEquilibrium(ring, parts)
+        fine = np.radians(np.arange(0, 360, 0.5))
+        self._uplift, self._even = even_loads(fine, *self.tractions(fine), parts.rigid)
+
+    @abstractmethod
+    def tractions(self, theta: np.ndarray) -> tuple[sparse.csr_array, sparse.csr_array]:
+        """Loads of a pressure and of a clockwise shear on the outer face, (n, n_theta) per Pa, from angles [rad]."""
+
+    @property
+    def iterations(self) -> list[int]:
+        """Newton's iterations at every time of the last response."""
+        return self._equilibrium.iterations
+
+    @property
+    def residuals(self) -> list[float]:
+        """Largest out-of-balance force of every iteration at the last time [N/m]."""
+        return self._equilibrium.residuals
+
+    def respond(self, pressures: xr.Dataset) -> xr.Dataset:
+        checked = check_pressures(pressures, self.ring)
+        states = self.solve(checked)
+        fields = {"balanced_uplift": states.balanced, "unborne_resultant": states.unborne}
+        read = zip(FORCES, self.readings.forces, strict=True)
+        fields |= {name: self._where_lined((part @ states.displacements.T).T) for name, part in read}
+        fields |= self.joint_fields(states)
+        fields |= self._balances(states)
+        fields["shear_moment_residual"] = self._shear_moment_residual(states, checked)
+        fields |= self._movements(states.displacements)
+        return response_dataset(self.ring, checked, fields, self.attributes())
+
+    def attributes(self) -> dict[str, str | float]:
+        """Where the answer comes from."""
+        return ring_attributes(self.ring, self.name)
+
+    def loads(self, checked: xr.Dataset) -> np.ndarray:
+        """Loads on the unknowns of checked pressures and of the concrete's weight, (n_times, n)."""
+        by_pressure, by_shear = self.tractions(np.radians(checked["theta"].values.astype(float)))
+        pressure = (checked["soil_pressure"] + checked["water_pressure"]).values.astype(float)
+        shear = checked["soil_shear"].values.astype(float)
+        return (by_pressure @ pressure.T + by_shear @ shear.T).T + self.parts.weight
+
+    def solve(self, checked: xr.Dataset) -> States:
+        """Equilibrium with checked pressures, one time after the other; raises as :meth:`respond` does."""
+        times, loads, rigid = checked["time"].values, self.loads(checked), self.parts.rigid
+        balanced = np.zeros(len(loads))
+        if self.ring.balance_uplift:
+            balanced = loads @ rigid[1]
+            loads = loads - balanced[:, None] * self._uplift
+        magnitude = self._equilibrium.sizes(loads).sum(axis=1)
+        loads, unborne = without_unborne(self.ring, loads, rigid @ loads.T, magnitude, self._even, times)
+        found, equilibrium = [], self._equilibrium
+        equilibrium.iterations.clear()
+        moved, before, slip = np.zeros(loads.shape[1]), np.zeros(loads.shape[1]), equilibrium.unslipped
+        # Factors are so small that threads only wait for each other: on a busy machine two cost 200 times one's time.
+        with threadpool_limits(limits=1, user_api="blas"):
+            for time, load in zip(times, loads, strict=True):
+                try:
+                    moved, slip = equilibrium.follow(load, moved, slip, before)
+                except NoEquilibrium as problem:
+                    right, up, _ = rigid @ load
+                    raise LiningFailure(
+                        f"ring: no equilibrium at time {time:g} s (loads sum to {right:.4g} N/m to the right,"
+                        f" {up:.4g} N/m up): {problem}",
+                        float(time),
+                    ) from problem
+                found.append((moved, slip, equilibrium.reactions(moved)[0]))
+                before = load
+                if equilibrium.joints.remembers:
+                    slip = equilibrium.joint_forces(moved, slip).slip
+        return States(loads, *(np.stack(kind) for kind in zip(*found, strict=True)), balanced, unborne)
+
+    def _where_lined(self, values):
+        values[:, ~self.readings.lined] = np.nan
+        return values
+
+    def joint_fields(self, states: States) -> dict[str, np.ndarray]:
+        """Movements of and forces in the joints, (n_times, n_joints) each."""
+        opening, dislocation, rotation = np.moveaxis(self._equilibrium.jumps(states.displacements), -1, 0)
+        axial, shear, moment, *_ = self._equilibrium.joint_forces(states.displacements, states.slips)
+        return {
+            "joint_opening": opening,
+            "joint_dislocation": dislocation,
+            "joint_rotation": rotation,
+            "joint_axial_force": axial,
+            "joint_shear_force": shear,
+            "joint_bending_moment": moment,
+        }
+
+    def _balances(self, states):
+        equilibrium, loads, held = self._equilibrium, states.loads, self.parts.held
+        pairs = zip(states.displacements, states.slips, strict=True)
+        internal = np.stack([equilibrium.internal_forces(*pair)[0] for pair in pairs])
+        reactions = equilibrium.spring_forces(states.reactions)
+        reactions[:, held] += (internal - loads - reactions)[:, held]
+        load_sum, reaction_sum = self.parts.rigid @ loads.T, self.parts.rigid @ reactions.T
+        gap = np.maximum(np.abs(load_sum + reaction_sum).max(0), np.abs(loads + reactions - internal).max(1))
+        return {
+            "load_sum_horizontal": load_sum[0],
+            "load_sum_vertical": load_sum[1],
+            "spring_sum_horizontal": reaction_sum[0],
+            "spring_sum_vertical": reaction_sum[1],
+            "equilibrium_residual": gap / np.maximum(equilibrium.sizes(loads).sum(axis=1), 1e-300),
+        }
+
+    def _shear_moment_residual(self, states, checked):
+        """Largest |Q + dM/ds + couple| around the ring, from forces as they are read: checks results, not matrices.
+
+        The couple per arc of the centre line is what shear and tangential soil springs on the outer face bring.
+        """
+        ring, at = self.ring, self.readings.stations
+        force, moment = (np.asarray((part @ states.displacements.T).T) for part in (at.shear, at.moment))
+        arc = ring.centre_radius * np.diff(at.angle, append=at.angle[0] + 2 * np.pi)
+        mean_shear = at.share * force + (1 - at.share) * np.roll(force, -1, axis=1)
+        theta, shear = np.radians(checked["theta"].values.astype(float)), checked["soil_shear"].values
+        applied = np.stack([np.interp(at.middle, theta, row, period=2 * np.pi) for row in shear])
+        traction = at.lined * (applied - (at.slip @ states.reactions.T).T)
+        lever = ring.thickness / 2 * ring.outer_radius / ring.centre_radius
+        gap = mean_shear + (np.roll(moment, -1, axis=1) - moment) / arc + lever * traction + at.couple
+        return np.abs(gap[:, at.judged]).max(axis=1)
+
+    def _movements(self, displacements):
+        """Displacements at the angles of the response, change of the diameters, settlement.
+
+        A ring has no place of its own where nothing holds it: that mean movement is taken out.
+        """
+        rigid, mean = self.parts.rigid, self.parts.mean
+        moved = displacements @ mean[:2].T
+        sideways, _, turning = borne(self.ring)
+        if not sideways:
+            displacements = displacements - moved @ rigid[:2]
+            moved = np.zeros_like(moved)
+        if not turning:
+            displacements = displacements - np.outer(displacements @ mean[2], rigid[2])
+        outward, along = ((part @ displacements.T).T for part in self.readings.movement)
+        crown, right_waist, invert, left_waist = self.readings.quarters @ displacements.T
+        return {
+            "displacement_radial": self._where_lined(outward),
+            "displacement_tangential": self._where_lined(along),
+            "convergence_horizontal": -(right_waist + left_waist),
+            "convergence_vertical": -(crown + invert),
+            "settlement": -moved[:, 1],
+        }
