@@ -129,41 +129,48 @@ class BandedTangent:
         """
         if self._constant is not None:
             return self._constant
-        band = self.band.copy(order="F")
-        band.reshape(-1, order="F")[self._touched] += self._products @ coefficients
-        solve = self._cholesky(band) if self.symmetric else self._lu(band)
+        solve = self._cholesky(coefficients) if self.symmetric else self._lu(coefficients)
         if self._ties is not None:
             solve = self._tied(solve)
         if not len(coefficients):
             self._constant = solve
         return solve
 
-    def _cholesky(self, band):
-        diagonal, untouched = band[0].copy(), band.copy(order="F")
+    def _cholesky(self, coefficients, shift=0.0):
+        band = self._assembled(coefficients)
+        diagonal = band[0].copy()
+        band[0] += shift * diagonal
         factor, failed = lapack.dpbtrf(band, lower=1, overwrite_ab=1)
-        if failed or np.min(factor[0] ** 2 / diagonal) < SMALLEST_PIVOT:
-            untouched[0] += SHIFT * diagonal
-            shifted, worse = lapack.dpbtrf(untouched, lower=1, overwrite_ab=1)
-            raise self._mechanism(lambda right: lapack.dpbtrs(shifted, right, lower=1)[0], diagonal, worse)
-        return self._placed(lambda right: lapack.dpbtrs(factor, right, lower=1)[0])
+        solve = self._placed(lambda right: lapack.dpbtrs(factor, right, lower=1)[0])
+        if not shift and (failed or np.min(factor[0] ** 2 / diagonal) < SMALLEST_PIVOT):
+            raise self._mechanism(self._cholesky(coefficients, SHIFT), diagonal)
+        return solve if not failed else None
 
-    def _lu(self, band):
+    def _lu(self, coefficients, shift=0.0):
         """Rows and columns are scaled to a diagonal of one, of which pivots then are shares."""
-        width, main = self.width, self.main
+        band, width, main = self._assembled(coefficients), self.width, self.main
         diagonal = band[main].copy()
         scale = 1 / np.sqrt(diagonal)
         for offset in range(-width, width + 1):
             columns = np.arange(max(0, -offset), self.size - max(0, offset))
             band[main + offset, columns] *= scale[columns] * scale[columns + offset]
-        untouched = band.copy(order="F")
+        band[main] += shift
         factor, pivots, failed = lapack.dgbtrf(band, width, width, overwrite_ab=1)
-        if failed or np.abs(factor[main]).min() < SMALLEST_PIVOT:
-            untouched[main] += SHIFT
-            shifted, swaps, worse = lapack.dgbtrf(untouched, width, width, overwrite_ab=1)
-            raise self._mechanism(
-                lambda right: scale * lapack.dgbtrs(shifted, width, width, scale * right, swaps)[0], diagonal, worse
-            )
-        return self._placed(lambda right: scale * lapack.dgbtrs(factor, width, width, scale * right, pivots)[0])
+        solve = self._placed(lambda right: scale * lapack.dgbtrs(factor, width, width, scale * right, pivots)[0])
+        if not shift and (failed or np.abs(factor[main]).min() < SMALLEST_PIVOT):
+            raise self._mechanism(self._lu(coefficients, SHIFT), diagonal)
+        return solve if not failed else None
+
+    def _assembled(self, coefficients):
+        band = self.band.copy(order="F")
+        band.reshape(-1, order="F")[self._touched] += self._products @ coefficients
+        return band
+
+    def _mechanism(self, shifted, diagonal):
+        """The failure, with the motion that a slightly stiffer matrix leaves easiest; unknown where that fails too."""
+        if shifted is None:
+            return Mechanism(np.full(self.size, np.nan))
+        return Mechanism(softest_motion(shifted, np.sqrt(diagonal)[self.place])[1])
 
     def _placed(self, solve):
         def solve_in_place(right):
@@ -182,8 +189,3 @@ class BandedTangent:
             return step - by_tie @ np.linalg.solve(compliance, self._ties.T @ step)
 
         return solve_tied
-
-    def _mechanism(self, solve, diagonal, failed):
-        if failed:
-            return Mechanism(np.full(self.size, np.nan))
-        return Mechanism(softest_motion(solve, np.sqrt(diagonal))[1][self.place])

@@ -24,6 +24,8 @@ from structure.ring_forces import RingParts
 
 #: Both sides of an angle [rad]: at a joint the mean of the two is given.
 SIDES = (-1e-9, 1e-9)
+#: Matrices are so small that threads only wait for each other: on a busy machine two cost 200 times one's time.
+one_thread = threadpool_limits.wrap(limits=1, user_api="blas")
 
 
 class Stations(NamedTuple):
@@ -115,6 +117,7 @@ class DiscreteLining(LiningModel):
         """Largest out-of-balance force of every iteration at the last time [N/m]."""
         return self._equilibrium.residuals
 
+    @one_thread
     def respond(self, pressures: xr.Dataset) -> xr.Dataset:
         checked = check_pressures(pressures, self.ring)
         states = self.solve(checked)
@@ -138,6 +141,7 @@ class DiscreteLining(LiningModel):
         shear = checked["soil_shear"].values.astype(float)
         return (by_pressure @ pressure.T + by_shear @ shear.T).T + self.parts.weight
 
+    @one_thread
     def solve(self, checked: xr.Dataset) -> States:
         """Equilibrium with checked pressures, one time after the other; raises as :meth:`respond` does."""
         times, loads, rigid = checked["time"].values, self.loads(checked), self.parts.rigid
@@ -150,22 +154,20 @@ class DiscreteLining(LiningModel):
         found, equilibrium = [], self._equilibrium
         equilibrium.iterations.clear()
         moved, before, slip = np.zeros(loads.shape[1]), np.zeros(loads.shape[1]), equilibrium.unslipped
-        # Factors are so small that threads only wait for each other: on a busy machine two cost 200 times one's time.
-        with threadpool_limits(limits=1, user_api="blas"):
-            for time, load in zip(times, loads, strict=True):
-                try:
-                    moved, slip = equilibrium.follow(load, moved, slip, before)
-                except NoEquilibrium as problem:
-                    right, up, _ = rigid @ load
-                    raise LiningFailure(
-                        f"ring: no equilibrium at time {time:g} s (loads sum to {right:.4g} N/m to the right,"
-                        f" {up:.4g} N/m up): {problem}",
-                        float(time),
-                    ) from problem
-                found.append((moved, slip, equilibrium.reactions(moved)[0]))
-                before = load
-                if equilibrium.joints.remembers:
-                    slip = equilibrium.joint_forces(moved, slip).slip
+        for time, load in zip(times, loads, strict=True):
+            try:
+                moved, slip = equilibrium.follow(load, moved, slip, before)
+            except NoEquilibrium as problem:
+                right, up, _ = rigid @ load
+                raise LiningFailure(
+                    f"ring: no equilibrium at time {time:g} s (loads sum to {right:.4g} N/m to the right,"
+                    f" {up:.4g} N/m up): {problem}",
+                    float(time),
+                ) from problem
+            found.append((moved, slip, equilibrium.reactions(moved)[0]))
+            before = load
+            if equilibrium.joints.remembers:
+                slip = equilibrium.joint_forces(moved, slip).slip
         return States(loads, *(np.stack(kind) for kind in zip(*found, strict=True)), balanced, unborne)
 
     def _where_lined(self, values):

@@ -118,9 +118,9 @@ class RingForces:
         if self.springs is None:
             return np.zeros_like(self.parts.area), np.zeros(0)
         felt = np.split(self.parts.feel @ displacement, 2)
-        normal, tangential = (soil_reaction(part, spring) for part, spring in zip(felt, self.springs, strict=True))
-        floor = TANGENT_FLOOR * self.springs[0].stiffness
-        return np.append(normal[0], tangential[0]), np.maximum(np.append(normal[1], tangential[1]), floor)
+        pairs = [soil_reaction(part, spring) for part, spring in zip(felt, self.springs, strict=True)]
+        reaction, tangent = map(np.concatenate, zip(*pairs, strict=True))
+        return reaction, np.maximum(tangent, TANGENT_FLOOR * self.springs[0].stiffness)
 
     def spring_forces(self, reactions: np.ndarray) -> np.ndarray:
         """Forces of the soil on the unknowns (..., n) from the reactions of its springs (..., n_springs)."""
@@ -148,7 +148,7 @@ class RingForces:
         internal, of_joints = self.internal_forces(displacement, slip)
         out_of_balance = loads + self.spring_forces(reactions) - internal
         out_of_balance[self.held] = 0
-        return out_of_balance, np.append(self.parts.area * stiffening if len(stiffening) else stiffening, of_joints)
+        return out_of_balance, np.concatenate([self.parts.area[: len(stiffening)] * stiffening, of_joints])
 
     def sizes(self, vectors: np.ndarray) -> np.ndarray:
         """Sizes at the nodes (..., n_nodes) of forces or displacements (..., n)."""

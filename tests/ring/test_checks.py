@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from test_ring_joints_and_springs import pressures, ring
+from rings import pressures, ring
 from test_sections import UNEQUAL, section
 
 from coupling.figures import utilisations as check_figures
