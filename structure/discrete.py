@@ -15,7 +15,7 @@ from scipy import sparse
 from threadpoolctl import threadpool_limits
 
 from structure.balance import borne, even_loads, without_unborne
-from structure.lining import LiningFailure, LiningModel, response_dataset, ring_attributes
+from structure.lining import THETA, LiningFailure, LiningModel, response_dataset, ring_attributes
 from structure.newton import NoEquilibrium, RingEquilibrium
 from structure.pressures import check_pressures
 from structure.response import FORCES
@@ -28,45 +28,26 @@ SIDES = (-1e-9, 1e-9)
 one_thread = threadpool_limits.wrap(limits=1, user_api="blas")
 
 
-class Stations(NamedTuple):
-    """Where Q + dM/ds + couple = 0 is checked: between stations around the ring and the ones after them.
-
-    angle : (n,) float64, of the stations, ascending [rad].
-    shear, moment : (n, n_unknowns) sparse, Q and M there.
-    middle : (n,) float64, the places between [rad].
-    share : (n,) float64, of the station before in Q at the middle.
-    slip : (n, n_springs) sparse, mean tangential reaction at the middle.
-    lined : (n,) float64, share of the tunnel's length that is lined there.
-    couple : (n,) float64, further clockwise couple per arc of the centre line [N].
-    judged : (n,) bool, False near forces that are concentrated.
-    """
-
-    angle: np.ndarray
-    shear: sparse.csr_array
-    moment: sparse.csr_array
-    middle: np.ndarray
-    share: np.ndarray
-    slip: sparse.csr_array
-    lined: np.ndarray
-    couple: np.ndarray
-    judged: np.ndarray
-
-
 class Readings(NamedTuple):
     """How a response is read from n unknowns, at the angles :data:`structure.lining.THETA`.
 
     forces : N, Q and M, (n_theta, n) sparse each.
     movement : radial and tangential displacement, (n_theta, n) sparse each.
     quarters : (4, n) sparse, radial displacement at crown, right waist, invert and left waist.
-    lined : (n_theta,) bool, False where there is no lining: forces and displacements there are NaN.
-    stations : Stations
+    spring_angle : (n_springs/2,) float64, where the soil springs are [rad].
+    lined : (n_theta,) float64, share of the tunnel's length that is lined; where there is no lining, forces and
+        displacements are NaN.
+    near_force : (n_theta,) bool, next to forces that are concentrated: there Q is no slope of M.
+    weight_offset : distance of the weight from the centre line, outward [m].
     """
 
     forces: tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array]
     movement: tuple[sparse.csr_array, sparse.csr_array]
     quarters: sparse.csr_array
+    spring_angle: np.ndarray
     lined: np.ndarray
-    stations: Stations
+    near_force: np.ndarray
+    weight_offset: float
 
 
 class States(NamedTuple):
@@ -126,7 +107,7 @@ class DiscreteLining(LiningModel):
         fields |= {name: self._where_lined((part @ states.displacements.T).T) for name, part in read}
         fields |= self.joint_fields(states)
         fields |= self._balances(states)
-        fields["shear_moment_residual"] = self._shear_moment_residual(states, checked)
+        fields["shear_moment_residual"] = self._shear_moment_residual(fields, states, checked)
         fields |= self._movements(states.displacements)
         return response_dataset(self.ring, checked, fields, self.attributes())
 
@@ -171,7 +152,7 @@ class DiscreteLining(LiningModel):
         return States(loads, *(np.stack(kind) for kind in zip(*found, strict=True)), balanced, unborne)
 
     def _where_lined(self, values):
-        values[:, ~self.readings.lined] = np.nan
+        values[:, self.readings.lined == 0] = np.nan
         return values
 
     def joint_fields(self, states: States) -> dict[str, np.ndarray]:
@@ -203,21 +184,33 @@ class DiscreteLining(LiningModel):
             "equilibrium_residual": gap / np.maximum(equilibrium.sizes(loads).sum(axis=1), 1e-300),
         }
 
-    def _shear_moment_residual(self, states, checked):
-        """Largest |Q + dM/ds + couple| around the ring, from forces as they are read: checks results, not matrices.
+    def _shear_moment_residual(self, fields, states, checked):
+        """Largest |Q + dM/ds + couple| between neighbouring angles, from the reported forces.
 
-        The couple per arc of the centre line is what shear and tangential soil springs on the outer face bring.
+        The couple per arc of the centre line is what shear and tangential soil springs on the outer face bring, and
+        the weight where its centre lies outside the centre line.
         """
-        ring, at = self.ring, self.readings.stations
-        force, moment = (np.asarray((part @ states.displacements.T).T) for part in (at.shear, at.moment))
-        arc = ring.centre_radius * np.diff(at.angle, append=at.angle[0] + 2 * np.pi)
-        mean_shear = at.share * force + (1 - at.share) * np.roll(force, -1, axis=1)
-        theta, shear = np.radians(checked["theta"].values.astype(float)), checked["soil_shear"].values
-        applied = np.stack([np.interp(at.middle, theta, row, period=2 * np.pi) for row in shear])
-        traction = at.lined * (applied - (at.slip @ states.reactions.T).T)
-        lever = ring.thickness / 2 * ring.outer_radius / ring.centre_radius
-        gap = mean_shear + (np.roll(moment, -1, axis=1) - moment) / arc + lever * traction + at.couple
-        return np.abs(gap[:, at.judged]).max(axis=1)
+        ring, read, span = self.ring, self.readings, 2 * np.pi / len(THETA)
+        middle = np.radians(THETA) + span / 2
+        force, moment = fields["shear_force"], fields["bending_moment"]
+        slope = (np.roll(moment, -1, axis=1) - moment) / (ring.centre_radius * span)
+        sources = [(np.radians(checked["theta"].values.astype(float)), checked["soil_shear"].values)]
+        if ring.ground is not None and ring.ground.slip_at == "outer_face":
+            angle, same = np.unique(np.round(read.spring_angle % (2 * np.pi), 9), return_inverse=True)
+            slipping = np.split(states.reactions, 2, axis=1)[1]
+            # Both sides of a joint at its place, half each.
+            sources.append((angle, [-np.bincount(same, row) / np.bincount(same) for row in slipping]))
+        traction = sum(
+            np.stack([np.interp(middle, angle, row, period=2 * np.pi) for row in rows]) for angle, rows in sources
+        )
+        couple = ring.thickness / 2 * ring.outer_radius / ring.centre_radius * traction
+        couple *= (read.lined + np.roll(read.lined, -1)) / 2
+        couple += ring.concrete_unit_weight * ring.thickness * read.weight_offset * np.sin(middle)
+        gap = np.abs((force + np.roll(force, -1, axis=1)) / 2 + slope + couple)
+        gap[:, read.near_force] = 0
+        if ring.support == "invert":
+            gap[:, np.abs(middle - np.pi) < 2 * span] = 0
+        return np.nanmax(gap, axis=1)
 
     def _movements(self, displacements):
         """Displacements at the angles of the response, change of the diameters, settlement.

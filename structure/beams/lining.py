@@ -8,11 +8,10 @@ from scipy import sparse
 from structure.banded import folded
 from structure.beams.elements import joint_jumps, section_operators, segment_stiffness, self_weight, traction_operator
 from structure.beams.mesh import RingMesh, displacements_at, forces_at
-from structure.discrete import SIDES, DiscreteLining, Readings, Stations
+from structure.discrete import SIDES, DiscreteLining, Readings
 from structure.lining import THETA
 from structure.ring import Ring, check_ring
 from structure.ring_forces import RingParts, whole_movements
-from structure.springs import joint_spring
 
 
 class BeamSpringLining(DiscreteLining):
@@ -47,20 +46,23 @@ def _parts(ring: Ring, mesh: RingMesh) -> RingParts:
     whole = whole_movements(size, nodes, mesh.node_angle, 1.0)
     rigid = whole.copy()
     rigid[2, 2::3] = 1 / ring.centre_radius
-    jumps, springs = joint_jumps(mesh), np.tile(joint_spring(ring), len(mesh.joint_after))
+    invert = int(np.argmin(np.abs(mesh.node_angle % (2 * np.pi) - np.pi)))
+    jumps = joint_jumps(mesh)
+    stiffness = ring.joint_normal_stiffness, ring.joint_shear_stiffness, ring.joint_rotational_stiffness
     # Tangential springs on the outer face also feel the rotation.
-    lever = np.zeros(mesh.n_nodes) + (ring.thickness / 2 if _slips_on_face(ring) else 0.0)
+    on_face = ring.ground is not None and ring.ground.slip_at == "outer_face"
+    lever = np.full(mesh.n_nodes, ring.thickness / 2 if on_face else 0.0)
     place = (np.concatenate([node, mesh.n_nodes + node, mesh.n_nodes + node]), mesh.unknowns(node).T.ravel())
     values = np.concatenate([np.ones(2 * mesh.n_nodes), lever])
     return RingParts(
         segments=segment_stiffness(ring, mesh),
-        linear_joints=(jumps.T @ sparse.diags_array(springs) @ jumps).tocsr(),
+        linear_joints=(jumps.T @ sparse.diags_array(np.tile(stiffness, len(mesh.joint_after))) @ jumps).tocsr(),
         jumps=jumps,
         feel=sparse.coo_array((values, place), shape=(2 * mesh.n_nodes, size)).tocsr(),
         area=np.tile(ring.outer_radius * mesh.node_span, 2),
         weight=self_weight(ring, mesh),
         place=mesh.unknowns(folded(mesh.n_nodes)).ravel(),
-        held=np.zeros(0, dtype=int) if ring.ground is not None else mesh.unknowns(_invert(mesh)),
+        held=np.zeros(0, dtype=int) if ring.ground is not None else mesh.unknowns(invert),
         nodes=nodes,
         node_angle=mesh.node_angle,
         rigid=rigid,
@@ -71,48 +73,15 @@ def _parts(ring: Ring, mesh: RingMesh) -> RingParts:
 
 def _readings(ring: Ring, mesh: RingMesh) -> Readings:
     theta = np.radians(THETA)
-    sections = section_operators(ring, mesh)
     at_theta = forces_at(mesh, theta)
     sides = [displacements_at(mesh, theta + side) for side in SIDES]
     movement = tuple((one + other) / 2 for one, other in zip(*sides, strict=True))
     return Readings(
-        forces=tuple((at_theta @ part).tocsr() for part in sections),
+        forces=tuple((at_theta @ part).tocsr() for part in section_operators(ring, mesh)),
         movement=movement,
         quarters=movement[0][:: len(THETA) // 4],
-        lined=np.ones(len(THETA), dtype=bool),
-        stations=_stations(ring, mesh, *sections[1:]),
+        spring_angle=mesh.node_angle,
+        lined=np.ones(len(THETA)),
+        near_force=np.zeros(len(THETA), dtype=bool),
+        weight_offset=0.0,
     )
-
-
-def _stations(ring, mesh, shear, moment):
-    """Middles of the elements; between them lie the nodes, where loads and springs act."""
-    following = np.roll(np.arange(len(mesh.span)), -1)
-    span = mesh.span + mesh.span[following]
-    middle = mesh.mid_angle + mesh.span / 2
-    # Both nodes of a joint bring their springs.
-    pairs = np.stack([mesh.second, mesh.first[following]], axis=1)
-    share = mesh.node_span[pairs] / (span[:, None] / 2) * _slips_on_face(ring)
-    share[:, 1] *= pairs[:, 0] != pairs[:, 1]
-    place = (np.repeat(np.arange(len(pairs)), 2), (mesh.n_nodes + pairs).ravel())
-    # The clamp's own couple is concentrated there.
-    clamp = mesh.node_angle[_invert(mesh)] if ring.support == "invert" else np.inf
-    return Stations(
-        angle=mesh.mid_angle,
-        shear=shear,
-        moment=moment,
-        middle=middle,
-        share=mesh.span / span,
-        slip=sparse.coo_array((share.ravel(), place), shape=(len(pairs), 2 * mesh.n_nodes)).tocsr(),
-        lined=np.ones(len(pairs)),
-        couple=np.zeros(len(pairs)),
-        judged=np.abs(np.exp(1j * middle) - np.exp(1j * clamp)) > 1e-9 if np.isfinite(clamp) else middle < np.inf,
-    )
-
-
-def _slips_on_face(ring: Ring) -> bool:
-    return ring.ground is not None and ring.ground.slip_at == "outer_face"
-
-
-def _invert(mesh: RingMesh) -> int:
-    """Node next to the invert."""
-    return int(np.argmin(np.abs(mesh.node_angle % (2 * np.pi) - np.pi)))

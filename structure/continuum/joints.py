@@ -7,7 +7,6 @@ from scipy import sparse
 
 from structure.continuum.mesh import ContinuumMesh
 from structure.ring import Ring
-from structure.springs import joint_spring
 
 #: Integrals of products of the three shape functions of a quadratic edge of unit length.
 EDGE_MASS = np.array([[4, 2, -1], [2, 16, 2], [-1, 2, 4]]) / 30
@@ -78,15 +77,14 @@ def joint_stiffness(ring: Ring, mesh: ContinuumMesh) -> sparse.csr_array:
     k_theta - k_n t^2/12.
     """
     n_unknowns = 2 * mesh.n_lines * mesh.n_levels
-    spring = joint_spring(ring)
     mass = _face_mass(mesh)
     fit, matrix = _best_fit(ring, mesh)
     touching = matrix[0, 0]
-    normal = spring.normal / touching * (mass - fit.T @ matrix @ fit) + fit.T @ (
-        np.diag([spring.normal, spring.rotation]) @ fit
+    normal = ring.joint_normal_stiffness / touching * (mass - fit.T @ matrix @ fit) + fit.T @ (
+        np.diag([ring.joint_normal_stiffness, ring.joint_rotational_stiffness]) @ fit
     )
     stiffness = sparse.csr_array((n_unknowns, n_unknowns))
-    for direction, face in ((1, normal), (0, spring.shear / touching * mass)):
+    for direction, face in ((1, normal), (0, ring.joint_shear_stiffness / touching * mass)):
         jumps = sparse.vstack([_face_jump(mesh, row, direction) for row in np.eye(mesh.n_levels)]).tocsr()
         spread = sparse.kron(face, sparse.eye_array(len(mesh.joint_before)))
         stiffness = stiffness + jumps.T @ spread @ jumps

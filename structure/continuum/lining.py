@@ -15,7 +15,7 @@ from structure.continuum.face import spring_feelers, traction_operator
 from structure.continuum.joints import joint_jumps, joint_stiffness, nodes_from_unknowns
 from structure.continuum.mesh import EDGE_MEAN, ContinuumMesh, GasketGroove, Gate
 from structure.continuum.sections import section_displacements, section_forces
-from structure.discrete import SIDES, DiscreteLining, Readings, States, Stations
+from structure.discrete import SIDES, DiscreteLining, Readings, States
 from structure.lining import THETA
 from structure.pressures import check_pressures
 from structure.response import FORCES
@@ -207,13 +207,16 @@ class ContinuumLining(DiscreteLining):
             shares = bolt_shares(ring, self.bolts, theta)
             forces = [part + share @ pull for part, share in zip(forces, shares, strict=True)]
         sides = [(theta + side) % (2 * np.pi) for side in SIDES]
+        columns = [mesh.locate(side)[0] for side in sides]
         moved = [section_displacements(mesh, side) for side in sides]
         return Readings(
             forces=tuple(forces),
             movement=tuple((one + other) / 2 @ to_nodes for one, other in zip(*moved, strict=True)),
             quarters=self._quarters(ring) @ to_nodes,
-            lined=np.all([mesh.locate(side)[0] >= 0 for side in sides], axis=0),
-            stations=self._stations(ring, theta, *forces[1:]),
+            spring_angle=mesh.column_angles()[:, 1],
+            lined=np.min([np.where(at < 0, 0.0, mesh.column_share[at]) for at in columns], axis=0),
+            near_force=near_anchors(ring, self.bolts, theta) if self.bolts else np.zeros(len(theta), dtype=bool),
+            weight_offset=ring.thickness**2 / 12 / ring.centre_radius,
         )
 
     def _quarters(self, ring):
@@ -226,35 +229,6 @@ class ContinuumLining(DiscreteLining):
             off = np.where(distance < half, half + distance, off)
         sides = [section_displacements(self.mesh, (quarters + side) % (2 * np.pi))[0] for side in (-off, off)]
         return (sides[0] + sides[1]) / 2
-
-    def _stations(self, ring, theta, shear, moment):
-        """The angles of the response. The weight has a couple too: its centre lies outside the centre line."""
-        mesh, span = self.mesh, 2 * np.pi / len(THETA)
-        middle = theta + span / 2
-        column = mesh.locate(middle)[0]
-        lined = np.all([mesh.locate(at)[0] >= 0 for at in (theta, np.roll(theta, -1), middle)], axis=0)
-        judged = lined.copy()
-        if ring.support == "invert":
-            # The clamp's own reaction is concentrated there, on both sides of its line.
-            judged &= np.abs(middle - np.pi) >= 2 * span
-        if self.bolts is not None:
-            judged &= ~near_anchors(ring, self.bolts, middle, 3 * span)
-        count = len(mesh.column_lines)
-        on_face = ring.ground is not None and ring.ground.slip_at == "outer_face"
-        rows = np.flatnonzero(lined & on_face)
-        return Stations(
-            angle=theta,
-            shear=shear,
-            moment=moment,
-            middle=middle,
-            share=np.full(len(theta), 0.5),
-            slip=sparse.coo_array(
-                (np.ones(len(rows)), (rows, count + column[rows])), shape=(len(theta), 2 * count)
-            ).tocsr(),
-            lined=mesh.column_share[column],
-            couple=ring.concrete_unit_weight * ring.thickness**3 / 12 / ring.centre_radius * np.sin(middle),
-            judged=judged,
-        )
 
     def joint_fields(self, states: States) -> dict[str, np.ndarray]:
         fields = super().joint_fields(states)
