@@ -15,7 +15,7 @@ from scipy import sparse
 from threadpoolctl import threadpool_limits
 
 from structure.balance import borne, even_loads, without_unborne
-from structure.lining import THETA, LiningFailure, LiningModel, response_dataset, ring_attributes
+from structure.lining import THETA, LiningFailure, LiningModel, response_dataset
 from structure.newton import NoEquilibrium, RingEquilibrium
 from structure.pressures import check_pressures
 from structure.response import FORCES
@@ -109,11 +109,11 @@ class DiscreteLining(LiningModel):
         fields |= self._balances(states)
         fields["shear_moment_residual"] = self._shear_moment_residual(fields, states, checked)
         fields |= self._movements(states.displacements)
-        return response_dataset(self.ring, checked, fields, self.attributes())
+        return response_dataset(self.ring, checked, fields, self.name, self.details())
 
-    def attributes(self) -> dict[str, str | float]:
-        """Where the answer comes from."""
-        return ring_attributes(self.ring, self.name)
+    def details(self) -> dict[str, str | float]:
+        """Attributes of a response that only this model has."""
+        return {}
 
     def loads(self, checked: xr.Dataset) -> np.ndarray:
         """Loads on the unknowns of checked pressures and of the concrete's weight, (n_times, n)."""

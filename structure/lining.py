@@ -66,7 +66,7 @@ class LiningModel(ABC):
         """
 
 
-def ring_attributes(ring: Ring, model: str) -> dict[str, str]:
+def origin(ring: Ring, model: str) -> dict[str, str]:
     """Where the answer of a lining model comes from: the model, the ring and what its ground bears."""
     attributes = {"Conventions": "CF-1.11", "model": model, "ring": ring.model_dump_json()}
     if ring.ground is not None:
@@ -76,12 +76,12 @@ def ring_attributes(ring: Ring, model: str) -> dict[str, str]:
 
 
 def response_dataset(
-    ring: Ring, pressures: xr.Dataset, fields: dict[str, np.ndarray], attributes: dict[str, Any]
+    ring: Ring, pressures: xr.Dataset, fields: dict[str, Any], model: str, details: dict[str, Any] | None = None
 ) -> xr.Dataset:
-    """Response to pressures with the schema's dimensions, units and names.
+    """Response to pressures with the schema's dimensions, units and names, and where it comes from.
 
     fields : name of :data:`structure.response.RESPONSE` to array, of further variables to (dimensions, array,
-    attributes);  attributes : from :func:`ring_attributes`, and more.
+    attributes);  model : its name;  details : further attributes.
     """
     variables = {name: (RESPONSE[name][0], value) if name in RESPONSE else value for name, value in fields.items()}
     joints = np.array(ring.joint_angles, dtype=float)
@@ -91,8 +91,9 @@ def response_dataset(
         "joint": ("joint", np.arange(1, len(joints) + 1)),
         "joint_angle": ("joint", joints),
     }
-    title = f"response of the lining: {attributes['model']} model"
-    response = xr.Dataset(variables, coords=axes, attrs={"title": title, **attributes})
+    title = f"response of the lining: {model} model"
+    attributes = {"title": title} | origin(ring, model) | (details or {})
+    response = xr.Dataset(variables, coords=axes, attrs=attributes)
     known = {name: meaning[-2:] for name, meaning in (COORDINATES | RESPONSE).items()}
     for name in known.keys() & response.variables.keys():
         units, long_name = known[name]

@@ -164,10 +164,11 @@ class RingForces:
 
     def loose_place(self, motion: np.ndarray) -> str:
         """What is said of a mechanism."""
+        if not len(self.unslipped):
+            return "rounding hides the stiffness of the ring: it is too thin for this mesh to hold without more ground"
         aside = "" if self.parts.ties is None else " (its bolts left aside)"
-        return (
-            f"the ring is a mechanism{aside}: joints too weak to hold it without more ground{self.freest_joint(motion)}"
-        )
+        weak = "joints too weak to hold it without more ground"
+        return f"the ring is a mechanism{aside}: {weak}{self.freest_joint(motion)}"
 
     def freest_joint(self, motion: np.ndarray) -> str:
         """Which joint moves most in a motion and how, for the message of a failure."""

@@ -16,7 +16,7 @@ from structure.continuum.joints import joint_jumps, joint_stiffness, nodes_from_
 from structure.continuum.mesh import EDGE_MEAN, ContinuumMesh, GasketGroove, Gate
 from structure.continuum.sections import section_displacements, section_forces
 from structure.discrete import SIDES, DiscreteLining, Readings, States
-from structure.lining import THETA
+from structure.lining import THETA, origin
 from structure.pressures import check_pressures
 from structure.response import FORCES
 from structure.ring import Ring, check_ring
@@ -146,7 +146,8 @@ class ContinuumLining(DiscreteLining):
             for name, (values, units, long_name) in places.items()
         }
         coordinates["time"] = ("time", ordered["time"].values, dict(ordered["time"].attrs))
-        attributes = {"title": "stresses in the lining: continuum model"} | self.attributes()
+        title = "stresses in the lining: continuum model"
+        attributes = {"title": title} | origin(self.ring, self.name) | self.details()
         return xr.Dataset(fields, coords=coordinates, attrs=attributes)
 
     def _parts(self, ring):
@@ -242,8 +243,8 @@ class ContinuumLining(DiscreteLining):
             fields["joint_bolt_force"] = ("time", "joint"), pull, BOLT_FORCE
         return fields
 
-    def attributes(self) -> dict[str, str | float]:
-        attributes = super().attributes() | {
+    def details(self) -> dict[str, str | float]:
+        attributes = {
             "mesh": f"{len(self.mesh.column_lines)} columns, {self.mesh.layers} layers of 9-node quadrilaterals",
             "joint_model": self.joint,
         }

@@ -72,9 +72,10 @@ def test_soft_joints_are_rightly_blamed_and_joints_of_a_crushed_ring_are_not():
     even = loads_of(degrees, np.full(36, 3e5), np.zeros(36))
     # each joint closes by N / k = 3e5 * 3.3 / 2e6 = 0.5 m
     soft = ring.model_copy(update={"joint_normal_stiffness": 2e6})
-    for model, moves in ((BeamSpringLining, "opens or closes"), (ContinuumLining, "gives way")):
+    for model in (BeamSpringLining, ContinuumLining):
         refusal = outcome(model, soft, even)
-        assert "beyond 0.33 m" in refusal and reason(model, soft, even, refusal) == (f"a soft joint {moves}", True)
+        assert "beyond 0.33 m" in refusal
+        assert reason(model, soft, even, refusal) == ("a soft joint opens or closes", True)
         refusal = outcome(model, ring, 1e5 * even)
         assert "beyond 0.33 m" in refusal and not reason(model, ring, 1e5 * even, refusal)[1]
 
