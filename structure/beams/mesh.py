@@ -94,15 +94,10 @@ def displacements_at(mesh: RingMesh, theta: np.ndarray) -> tuple[sparse.csr_arra
     along = (theta[:, None] - mesh.node_angle[mesh.first]) % (2 * np.pi)
     element = np.argmax(along <= mesh.span, axis=1)
     share = along[np.arange(len(theta)), element] / mesh.span[element]
-    rows, columns, radial, tangential = [], [], [], []
-    for nodes, of_node in ((mesh.first[element], 1 - share), (mesh.second[element], share)):
-        cosine, sine = np.cos(theta - mesh.node_angle[nodes]), np.sin(theta - mesh.node_angle[nodes])
-        for way, values in enumerate(((cosine, -sine), (sine, cosine))):
-            rows.append(np.arange(len(theta)))
-            columns.append(3 * nodes + way)
-            radial.append(of_node * values[0])
-            tangential.append(of_node * values[1])
-    place, shape = (np.concatenate(rows), np.concatenate(columns)), (len(theta), 3 * mesh.n_nodes)
+    nodes = np.stack([mesh.first[element], mesh.second[element]], axis=1)
+    of_node, lean = np.stack([1 - share, share], axis=1), theta[:, None] - mesh.node_angle[nodes]
+    cosine, sine = of_node * np.cos(lean), of_node * np.sin(lean)
     return tuple(
-        sparse.coo_array((np.concatenate(values), place), shape=shape).tocsr() for values in (radial, tangential)
+        mesh.gathered(np.stack([*parts, np.zeros_like(lean)], axis=2).reshape(-1, 6), *nodes.T)
+        for parts in ((cosine, sine), (-sine, cosine))
     )

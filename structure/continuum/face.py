@@ -60,8 +60,6 @@ def spring_feelers(ring: Ring, mesh: ContinuumMesh) -> tuple[sparse.csr_array, n
     """
     edges = mesh.column_angles()
     area = ring.outer_radius * mesh.column_share * (edges[:, 2] - edges[:, 0])
-    outer = np.zeros(mesh.n_levels)
-    outer[-1] = 1.0
     count = len(mesh.column_lines)
     unknowns = 2 * (mesh.column_lines * mesh.n_levels + mesh.n_levels - 1)
     rows = np.repeat(np.arange(count), 3)
