@@ -156,7 +156,9 @@ class BandedTangent:
             band[main + offset, columns] *= scale[columns] * scale[columns + offset]
         band[main] += shift
         factor, pivots, failed = lapack.dgbtrf(band, width, width, overwrite_ab=1)
-        solve = self._placed(lambda right: scale * lapack.dgbtrs(factor, width, width, scale * right, pivots)[0])
+        solve = self._placed(
+            lambda right: (lapack.dgbtrs(factor, width, width, (right.T * scale).T, pivots)[0].T * scale).T
+        )
         if not shift and (failed or np.abs(factor[main]).min() < SMALLEST_PIVOT):
             raise self._mechanism(self._lu(coefficients, SHIFT), diagonal)
         return solve if not failed else None

@@ -65,7 +65,7 @@ class Concrete:
             elements, ElementQuad2(), quadrature=(np.stack([along, across]), np.outer(weights, weights).ravel())
         )
         x, y = basis.global_coordinates()
-        values, gradients = (np.stack([getattr(one[0], name) for one in basis.basis]) for name in ("value", "grad"))
+        values, gradients = (np.stack(kind) for kind in zip(*((one, one.grad) for (one,) in basis.basis), strict=True))
         return values, gradients, np.arctan2(x, y), np.hypot(x, y), basis.dx
 
     def _strains(self, gradients, angle):
