@@ -37,13 +37,12 @@ def test_ring_that_moves_as_a_whole_is_read_so_and_bears_nothing(model):
         np.testing.assert_allclose(lining.parts.mean @ lining.parts.rigid[way], np.eye(3)[way], atol=1e-5)
 
 
-@ALL
-@pytest.mark.parametrize("gate", [None, (20.0, 0.8)])
-def test_even_loads_have_one_resultant_each(model, gate):
-    if model == "beams" and gate:
-        pytest.skip("beams have no gate")
-    free = dict(joint_angles=(), **FREE) if gate else FREE
-    lining = MODELS[model](**free) if gate is None else ContinuumLining(ring(**free), columns=101, gate=gate)
+@pytest.mark.parametrize("model", [*MODELS, "slot"])
+def test_even_loads_have_one_resultant_each(model):
+    if model == "slot":
+        lining = ContinuumLining(ring(joint_angles=(), **FREE), columns=101, gate=(20.0, 0.8))
+    else:
+        lining = MODELS[model](**FREE)
     # 1e-12: solved to rounding, also where the face is not closed.
     np.testing.assert_allclose(lining._even @ lining.parts.rigid.T, np.eye(3), atol=1e-12)
     assert lining._uplift @ lining.parts.rigid[1] == pytest.approx(1, rel=1e-12)
