@@ -122,7 +122,6 @@ class DiscreteLining(LiningModel):
         shear = checked["soil_shear"].values.astype(float)
         return (by_pressure @ pressure.T + by_shear @ shear.T).T + self.parts.weight
 
-    @one_thread
     def solve(self, checked: xr.Dataset) -> States:
         """Equilibrium with checked pressures, one time after the other; raises as :meth:`respond` does."""
         times, loads, rigid = checked["time"].values, self.loads(checked), self.parts.rigid

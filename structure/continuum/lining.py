@@ -15,7 +15,7 @@ from structure.continuum.face import spring_feelers, traction_operator
 from structure.continuum.joints import joint_jumps, joint_stiffness, nodes_from_unknowns
 from structure.continuum.mesh import EDGE_MEAN, ContinuumMesh, GasketGroove, Gate
 from structure.continuum.sections import section_displacements, section_forces
-from structure.discrete import SIDES, DiscreteLining, Readings, States
+from structure.discrete import SIDES, DiscreteLining, Readings, States, one_thread
 from structure.lining import THETA, origin
 from structure.pressures import check_pressures
 from structure.response import FORCES
@@ -110,6 +110,7 @@ class ContinuumLining(DiscreteLining):
     def tractions(self, theta: np.ndarray) -> tuple[sparse.csr_array, sparse.csr_array]:
         return tuple((self._to_nodes.T @ part).tocsr() for part in traction_operator(self.ring, self.mesh, theta))
 
+    @one_thread
     def stress_field(self, pressures: xr.Dataset) -> xr.Dataset:
         """Stresses in the concrete at two by two points of every element.
 
