@@ -17,7 +17,7 @@ import traceback
 from collections import Counter
 from pathlib import Path
 
-from verification.pages import need_docs
+from verification.robustness.page import check_page, write_part
 
 COUNTS = {"scenes": 10_000, "files": 1_000, "pressures": 2_000, "rings": 200}
 PYTHON_EVERY = 4  # every so many scenes also as Python dictionaries
@@ -53,10 +53,7 @@ def main():
     parser.add_argument("--count", type=int)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    from verification.robustness.page import write_part
-
-    need_docs()
-
+    check_page()
     faults = 0
     for what in [options.what] if options.what else COUNTS:
         count = options.count or COUNTS[what]
@@ -111,8 +108,7 @@ def scenes(place, count, seed):
         faults += [fault] if fault else []
     return {
         "verdicts": dict(verdicts.most_common()), "faults": faults, "slowest_seconds": slowest,
-        "bases": list(bases), "dotted": dict(dotted.most_common()),
-        "python_every": PYTHON_EVERY, "simulated": len(simulated), "patience": wild_scenes.PATIENCE,
+        "dotted": dict(dotted.most_common()), "simulated": len(simulated),
     }  # fmt: skip
 
 
@@ -120,13 +116,14 @@ def changed_by_names(chance, place, kind, text):
     """Verdict on a good scene that is changed by dotted names, right and wrong ones."""
     import coupling
     from verification.robustness import wild_scenes
+    from verification.sensitivity.variants import value_at
 
     file = place / f"{kind.replace(' ', '-')}.toml"
     file.write_text(text, encoding="utf-8")
     changes, (name, expected) = wild_scenes.wild_changes(chance)
     verdict, _ = wild_scenes.judged(lambda: coupling.load_scene(file, **changes), "scene", False)
     if verdict != "refused":
-        found = wild_scenes.value_at(coupling.load_scene(file, **changes), name)
+        found = value_at(coupling.load_scene(file, **changes), name)
         assert abs(found - expected) <= 1e-12 * expected, f"{changes}: {name} is {found}"
     return verdict
 
@@ -137,7 +134,7 @@ def simulation_fault(place, text, number):
 
     from coupling import load_scene, run
     from coupling.datasets import raw_groups
-    from verification.robustness.damaged_files import in_a_process
+    from verification.child import in_a_process
 
     scene = place / f"run-{number}.toml"
     scene.write_text(text, encoding="utf-8")
@@ -182,7 +179,7 @@ def files(place, count, seed):
                 faults.append(f"{kind} {number}: {str(fault)[-300:]}")
             counts[verdict] += 1
         verdicts[kind] = dict(counts.most_common())
-    return {"verdicts": verdicts, "faults": faults, "patience": damaged_files.PATIENCE}
+    return {"verdicts": verdicts, "faults": faults}
 
 
 def good_files(place):
@@ -228,8 +225,7 @@ def pressures(place, count, seed):
             verdict = "fault"
             faults.append(f"{kind} {number}: {traceback.format_exc()[-300:]}")
         verdicts.setdefault(kind, Counter())[verdict] += 1
-    return {"verdicts": {kind: dict(verdicts[kind]) for kind in sorted(verdicts)}, "faults": faults,
-            "patience": wild_pressures.PATIENCE}  # fmt: skip
+    return {"verdicts": {kind: dict(verdicts[kind]) for kind in sorted(verdicts)}, "faults": faults}
 
 
 def rings(place, count, seed):

@@ -3,11 +3,22 @@
 import os
 import time as clock
 
+from mpm.solver import cores
 from verification.speed import processes
 from verification.speed.layout import bytes_per_point_step, operations_per_point_step
 from verification.speed.reference import ReferenceLoop, copy_bandwidth
-from verification.speed.sizes import LARGEST, SIZES, size_ladder, slope
-from verification.speed.stepping import SECONDS_OF_WARM_UP, configurations, kernel_times, prepared, rate, timed
+from verification.speed.stepping import (
+    LARGEST,
+    SECONDS_OF_WARM_UP,
+    SIZES,
+    configurations,
+    kernel_times,
+    prepared,
+    rate,
+    size_ladder,
+    slope,
+    timed,
+)
 from verification.speed.studies import study_seconds
 
 ROUNDS, SECONDS = 3, 1.0
@@ -81,15 +92,12 @@ def _beside_reference(solver, rounds, seconds):
         step_rounds.append(rate(solver, seconds)[0])
         count, used, _ = timed(reference.step, seconds)
         reference_rounds.append(count * solver.n_points / used)
+    step, loop = max(step_rounds), max(reference_rounds)
     return {
-        "points": int(solver.n_points),
-        "step_points_per_second": max(step_rounds),
-        "reference_points_per_second": max(reference_rounds),
-        "step_to_reference_ratio": max(step_rounds) / max(reference_rounds),
-        "step_rounds": step_rounds,
-        "reference_rounds": reference_rounds,
+        "points": int(solver.n_points), "step_points_per_second": step, "reference_points_per_second": loop,
+        "step_to_reference_ratio": step / loop, "step_rounds": step_rounds, "reference_rounds": reference_rounds,
         "copy_bytes_per_second": copy_bandwidth(),
-    }
+    }  # fmt: skip
 
 
 def _configurations(mpm_scene, mesh, seconds):
@@ -97,14 +105,10 @@ def _configurations(mpm_scene, mesh, seconds):
     for name, scene in configurations(mpm_scene):
         solver = prepared(scene, mesh)
         per_second, _, simulated = max(rate(solver, 0.5 * seconds) for _ in range(2))
-        rows.append(
-            {
-                "configuration": name,
-                "points_per_second": per_second,
-                "simulated_per_cpu_second": simulated,
-                "bytes_per_point": solver.memory_bytes() / solver.n_points,
-            }
-        )
+        rows.append({
+            "configuration": name, "points_per_second": per_second, "simulated_per_cpu_second": simulated,
+            "bytes_per_point": solver.memory_bytes() / solver.n_points,
+        })  # fmt: skip
     return rows
 
 
@@ -124,16 +128,11 @@ def _threads(mpm_scene, mesh, rounds, seconds):
 
 
 def _throughput():
-    count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
-    begin = clock.perf_counter()
+    count, begin = cores(), clock.perf_counter()
     one, alone = processes.throughput(1)
     many, shared = processes.throughput(count)
     return {
-        "runs": count,
-        "one_points_per_wall_second": one,
-        "all_points_per_wall_second": many,
-        "share_of_ideal": many / (count * one),
-        "processor_share_of_one": alone,
-        "processor_share_of_each": shared,
+        "runs": count, "one_points_per_wall_second": one, "all_points_per_wall_second": many,
+        "share_of_ideal": many / (count * one), "processor_share_of_one": alone, "processor_share_of_each": shared,
         "seconds": clock.perf_counter() - begin,
-    }
+    }  # fmt: skip

@@ -1,13 +1,21 @@
-"""Processor time of whole steps and of their kernels, for what a scene has and has not."""
+"""Processor time of whole steps and of their kernels, for what a scene has and has not and for numbers of points."""
 
 import math
 import time as clock
 
 import numpy as np
 
+import mpm
 from mpm.long_step import PASSES
+from mpm.simulation import STEPS_BETWEEN_CHECKS
+from verification.boxes import box_mesh
 
 SECONDS_OF_WARM_UP = 0.5
+ROUNDS = 3  # the best counts: other programs slow one down, and in few steps of many points a spectrum may fall or not
+SIZES = (1e3, 1e4, 1e5, 1e6)
+LARGEST = 3e6
+#: Methods of the solver that a step calls only now and then, and what they are called in the table.
+OCCASIONAL = {"_sort_physically": "sorting", "_update_wave_speed": "spectrum"}
 
 
 def configurations(scene):
@@ -29,8 +37,6 @@ def configurations(scene):
 
 def prepared(mpm_scene, mesh, threads=1):
     """A solver with its gate open that has stepped until its kernels are compiled and its points are spread."""
-    import mpm
-
     solver = mpm.Solver(mpm_scene, mesh, threads)
     if mpm_scene.gate is not None:
         solver.open_gate()
@@ -41,8 +47,6 @@ def prepared(mpm_scene, mesh, threads=1):
 
 def steps(solver):
     """As many steps at once as a run does until it looks at the inflow again."""
-    from mpm.simulation import STEPS_BETWEEN_CHECKS
-
     solver.advance(math.inf, STEPS_BETWEEN_CHECKS)
 
 
@@ -61,10 +65,6 @@ def rate(solver, seconds):
     _, used, wall = timed(lambda: steps(solver), seconds)
     done = solver.point_steps - points
     return done / used, done / wall, (solver.time - time) / used
-
-
-#: Methods of the solver that a step calls only now and then, and what they are called in the table.
-OCCASIONAL = {"_sort_physically": "sorting", "_update_wave_speed": "spectrum"}
 
 
 def kernel_times(solver, seconds):
@@ -98,3 +98,30 @@ def kernel_times(solver, seconds):
     used["python"] = total - sum(used.values())
     done = solver.point_steps - points
     return {name: spent / done for name, spent in sorted(used.items(), key=lambda item: -item[1])}
+
+
+def size_ladder(scene, sizes, seconds):
+    """Point-steps per processor second and bytes a point of boxes of a scene's first soil with about so many points.
+
+    Wet Mohr-Coulomb ground, the same everywhere: list of dicts.
+    """
+    rows = []
+    for size in sizes:
+        cells = round(math.sqrt(size / 6))  # two triangles of three points
+        grid, width, depth = np.linspace(0, 1, cells + 1), scene.box.width, 0.5 * scene.box.depth
+        box = scene.box.model_copy(update={"depth": depth})
+        ground = scene.model_copy(update={"box": box, "tunnels": (), "gate": None, "soils": scene.soils[:1]})
+        solver = prepared(ground, box_mesh(width * (grid - 0.5), depth * (grid - 1)))
+        rows.append({
+            "points": int(solver.n_points), "bytes_per_point": solver.memory_bytes() / solver.n_points,
+            "points_per_second": max(rate(solver, seconds)[0] for _ in range(ROUNDS)),
+        })  # fmt: skip
+    return rows
+
+
+def slope(rows):
+    """Exponent of the cost of a step over the number of points, between the sizes beyond the cache and the last [-]."""
+    large = [row for row in rows if row["points"] > 5e3]
+    points = np.log([row["points"] for row in large])
+    cost = points - np.log([row["points_per_second"] for row in large])
+    return float(np.polyfit(points, cost, 1)[0])

@@ -4,9 +4,8 @@ import numpy as np
 
 from mpm.contact import FIXED_X, FIXED_Y
 from mpm.long_step import ADVANCE, FOLLOW, PLAN, REMAP, SOLVE, UPDATE
-from mpm.scene import Scene
 from mpm.solver import Solver
-from mpm.variables import B_D, V_DLX, V_DLY, V_DSX, V_DSY, V_LX, V_LY, V_ML, V_MS, V_SX, V_SY
+from mpm.variables import B_D, S_DRAG, V_DLX, V_DLY, V_DSX, V_DSY, V_LX, V_LY, V_ML, V_MS, V_SX, V_SY
 
 
 class DrivenSolver(Solver):
@@ -38,6 +37,10 @@ class DrivenSolver(Solver):
         self.driven, self.velocity = np.zeros(shape, bool), np.zeros(shape)
         self.driven_liquid, self.velocity_liquid = np.zeros(shape, bool), np.zeros(shape)
         self.force, self.reaction = np.zeros(shape), np.zeros(shape)
+
+    def let_drain(self, conductivity, gravity=9.81):
+        """Give a weightless scene the drag that its conductivity [m/s] has under gravity [m/s2]."""
+        self.soils[:, S_DRAG] = gravity / conductivity
 
     def _advance(self, batch):
         self._run(PLAN, SOLVE, batch)
@@ -75,27 +78,3 @@ class DrivenSolver(Solver):
         jump = np.where(moved, self.velocity_liquid - row[:, V_LX : V_LY + 1], 0.0)
         row[:, V_LX : V_LY + 1] += jump
         row[:, V_DLX : V_DLY + 1] += jump
-
-
-def box_scene(name, size, width, depth, soil, water=None, gravity=9.81, points=3, **numerics):
-    """A scene of one soil without a tunnel; `soil` overrides the entries of a cohesionless sand, no `water`: dry.
-
-    `points` and `numerics` are what a problem hands through: points an element, and fields of `mpm.scene.Numerics`.
-    """
-    if water is not None:
-        water = {"table_depth": 0.0, "density": 1000.0, **water}
-    return Scene.model_validate({
-        "name": name, "gravity": gravity, "box": {"width": width, "depth": depth}, "water": water,
-        "soils": [{
-            "name": name, "top_depth": 0.0, "model": "mohr-coulomb", "youngs_modulus": 2e7, "poissons_ratio": 0.3,
-            "cohesion": 0.0, "friction_angle": 30.0, "dilatancy_angle": 0.0, "porosity": 0.4, "loose_porosity": 0.85,
-            "grain_density": 2650.0, "k0": 0.5, **soil,
-        }],
-        "discretisation": {
-            "element_size": size, "element_size_lining": size, "element_size_interior": size, "gate_radius": size,
-            "points_per_element": points,
-        },
-        "numerics": numerics,
-        "stop": {"time": 1.0},
-        "output": {"interval": 1.0},
-    })  # fmt: skip
