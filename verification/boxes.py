@@ -141,8 +141,8 @@ def clear_stress(solver, pore_pressure=0.0):
 
 def set_porosity(solver, porosity):
     """Thin the grains of all points out to a porosity, in the volume that they have."""
-    grains = state(solver, "grain_mass") * (1 - porosity) / (1 - state(solver, "porosity"))
-    put(solver, grain_mass=grains, porosity=porosity)
+    share = (1 - porosity) / (1 - state(solver, "porosity"))
+    put(solver, grain_mass=state(solver, "grain_mass") * share, porosity=porosity)
 
 
 def hold(solver, nodes, x=None, y=None):

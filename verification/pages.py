@@ -74,8 +74,8 @@ def docs_page(name, *blocks):
 
 def table(head, rows):
     """Lines of a table; cells are shown by `str`."""
-    shown = [[str(cell) for cell in row] for row in (head, ["---"] * len(head), *rows)]
-    return ["| " + " | ".join(row) + " |" for row in shown]
+    first, *others = ["| " + " | ".join(map(str, row)) + " |" for row in (head, *rows)]
+    return [first, "|" + "---|" * len(head), *others]
 
 
 def write_data(path, data):

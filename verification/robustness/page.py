@@ -41,7 +41,7 @@ def block(name, part):
     if "seconds" in part:
         told.append(f"together {part['seconds']:.0f} s")
     return [
-        *lines, "", "- " + "\n- ".join(told), "", *(f"- `{fault}`" for fault in shown), "" * bool(shown),
+        *lines, "", "- " + "\n- ".join(told), "", *(f"- `{fault}`" for fault in shown), *[""] * bool(shown),
         f"Measured by `uv run python -m verification.robustness.{command.format(name=name, **part)}` on "
         f"{part['date']} at revision {part['revision'] or 'unknown'} on {part['machine']}.",
     ]  # fmt: skip
