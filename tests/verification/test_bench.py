@@ -5,12 +5,13 @@ import math
 
 import numpy as np
 import pytest
+from verification.speed.sizes import slope
 
 import mpm
+from verification.pages import DOCS, Page
 from verification.small_event import small_scene
-from verification.speed import layout, processes, studies
+from verification.speed import layout, processes, report
 from verification.speed.command import bench
-from verification.speed.sizes import slope
 from verification.speed.stepping import configurations, kernel_times, prepared
 
 pytestmark = pytest.mark.slow
@@ -78,14 +79,15 @@ def test_solver_is_imported_within_a_third_of_a_second_of_numba():
     assert processes.import_seconds(["mpm over numba"])["mpm over numba"] < 0.3
 
 
-def test_section_on_studies_is_the_last_of_its_page_and_written_anew(tmp_path):
-    for name in ("performance.md", "performance.json"):
-        (tmp_path / name).write_bytes((studies.DOCS / name).read_bytes())
-    data = json.loads((tmp_path / "performance.json").read_text())["study"]
-    before = (tmp_path / "performance.md").read_text()
-    studies.write(data, tmp_path)
-    assert (tmp_path / "performance.md").read_text() == before
-    studies.write(data | {"share_of_loop": 0.123}, tmp_path)
-    after = (tmp_path / "performance.md").read_text()
-    assert after.count(studies.HEADING) == 1 and "takes 0.12 of the faster loop" in after
-    assert after.split(studies.HEADING)[0] == before.split(studies.HEADING)[0]
+def test_page_is_that_of_its_stored_numbers_and_keeps_what_is_written_by_hand(tmp_path):
+    text, data = (DOCS / "performance.md").read_text(), json.loads((DOCS / "performance.json").read_text())
+    (tmp_path / "performance.md").write_text(text)
+    page = report.bench_page(tmp_path)
+    blocks = report.blocks(data)
+    page.fill({name: lines for name, lines in blocks.items() if name != "made"})
+    assert (tmp_path / "performance.md").read_text() == text
+    page = Page(tmp_path / "performance.md", "Performance", ["study"])
+    page.fill({"study": report.study_block(data["study"] | {"share_of_loop": 0.123})})
+    changed = (tmp_path / "performance.md").read_text()
+    assert "takes 0.12 of the faster loop" in changed
+    assert changed.split("<!-- study -->")[0] == text.split("<!-- study -->")[0]

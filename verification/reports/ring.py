@@ -1,10 +1,13 @@
 """Pictures and tables of docs/ring.md: joint laws, an example of checks, errors of the beam-spring ring and its cost.
 
-uv run python -m verification.reports.ring
+uv run python -m verification.reports.ring [FOLDER]    # only the pictures, into a folder, when given
 """
 
 import re
+import sys
 import time as clock
+import tomllib
+from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -124,18 +127,16 @@ def example_of_checks(scene, limits):
     return checks(check(BeamSpringLining(ring).respond(pressures), limits))
 
 
-def main(records=RECORDS):
+def main(folder=None, records=RECORDS):
     """Everything, into docs/ring.md, whose example of limits is drawn."""
-    page, scene, images = docs_page("ring", "made", "closed form", "cost"), load_scene("case-3"), DOCS / "images"
+    page, scene = docs_page("ring", "made", "closed form", "cost"), load_scene("case-3")
+    images = Path(folder or DOCS / "images")
     (limits,) = re.findall(r'```toml title="limits.toml"\n(.*?)```', page.text, re.S)
-    file = images / "limits.toml"
-    try:
-        file.write_text(limits, encoding="utf-8")
-        example = example_of_checks(scene, Limits.from_toml(file))
-    finally:
-        file.unlink(missing_ok=True)
+    example = example_of_checks(scene, Limits.model_validate(tomllib.loads(limits)))
     example.savefig(images / "ring_checks.png", dpi=RESOLUTION)
     joint_laws(images / "joint_laws.png")
+    if folder is not None:
+        return
     page.fill({
         "made": made_by("uv run python -m verification.reports.ring"),
         "closed form": table(("elements", "N", "Q", "M", "displacement", "CPU s"), closed_form_errors(scene)),
@@ -144,4 +145,4 @@ def main(records=RECORDS):
 
 
 if __name__ == "__main__":
-    main()
+    main(*sys.argv[1:2])

@@ -74,7 +74,7 @@ def quantities(data, inflow_mass, gate=90.0):
         extreme forces; rotation and opening of joints 2 and 3; roughness and noise of the soil pressure: its root mean
         square off the mean and off the parabola over `HALF_ARC` each side, beyond `BESIDE_GATE` from the gate.
     """
-    mass = data["inflow_mass"].values
+    mass = data["inflow_mass"].max("case").values  # the same of all cases
     at = int(np.abs(mass - inflow_mass).argmin())
     late = data.isel(progress=(mass >= LATE * mass[at]) & (mass <= mass[at])).mean("progress")
     late = late.isel(model=0) if "model" in late.dims else late
