@@ -5,14 +5,13 @@ import math
 
 import numpy as np
 import pytest
-from verification.speed.sizes import slope
 
 import mpm
 from verification.pages import DOCS, Page
 from verification.small_event import small_scene
-from verification.speed import layout, processes, report
-from verification.speed.command import bench
-from verification.speed.stepping import configurations, kernel_times, prepared
+from verification.speed import processes, report
+from verification.speed.command import bench, bytes_per_point_step
+from verification.speed.stepping import configurations, kernel_times, prepared, slope
 
 pytestmark = pytest.mark.slow
 
@@ -32,19 +31,10 @@ def test_kernel_times_add_up_to_the_step_and_leave_the_solver_as_it_was(solver):
 
 
 def test_bytes_of_a_point_are_two_passes_over_its_row_order_and_soil(solver):
-    counted = layout.bytes_per_point_step(solver)
+    counted = bytes_per_point_step(solver)
     assert counted["points"] == 2 * (2 * 16 * 8 + 4 + 4)  # 16 numbers of 8 bytes, read and written; two integers
     assert counted["elements"] > 0
     assert counted["nodes"] > 0
-
-
-def test_operations_are_those_of_the_loop_over_points():
-    source = (
-        "for j in range(start[e], start[e + 1]):\n    a = b * c + d\n    a += 2.0 / b\n    if a > b:\n        a = 0"
-    )
-    loop = layout.ast.parse(source).body[0]
-    assert layout._over_points(loop)
-    assert sum(layout._operations(line) for line in loop.body) == 4  # times, plus, plus, over
 
 
 def test_slope_is_that_of_a_power_law():

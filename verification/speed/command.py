@@ -3,9 +3,10 @@
 import os
 import time as clock
 
+import numpy as np
+
 from mpm.solver import cores
 from verification.speed import processes
-from verification.speed.layout import bytes_per_point_step, operations_per_point_step
 from verification.speed.reference import ReferenceLoop, copy_bandwidth
 from verification.speed.stepping import (
     LARGEST,
@@ -46,9 +47,9 @@ def bench(scene, step_only=False, large=False, tell=lambda line: None, rounds=RO
     dict
         step_points_per_second, reference_points_per_second: point-steps per second of processor time, one thread;
         step_to_reference_ratio; scene, points, elements, step_rounds, reference_rounds: all measurements;
-        copy_bytes_per_second; bytes_per_point: memory of the solver; bytes_per_point_step, operations_per_point_step:
-        counted; roofline_points_per_second: copy over bytes; kernels: name to processor seconds per point-step; load:
-        mean number of running programs before and after. Unless `step_only` also configurations, threads, sizes,
+        copy_bytes_per_second; bytes_per_point: memory of the solver; bytes_per_point_step: as counted;
+        roofline_points_per_second: copy over bytes; kernels: name to processor seconds per point-step; load: mean
+        number of running programs before and after. Unless `step_only` also configurations, threads, sizes,
         size_slope, imports [s], start [s], first_step_wall_seconds, throughput, study (`studies.study_seconds`).
     """
     import mpm
@@ -60,7 +61,6 @@ def bench(scene, step_only=False, large=False, tell=lambda line: None, rounds=RO
     data["elements"] = len(mesh.elements)
     data["bytes_per_point"] = solver.memory_bytes() / solver.n_points
     data["bytes_per_point_step"] = bytes_per_point_step(solver)
-    data["operations_per_point_step"] = operations_per_point_step(solver)
     data["roofline_points_per_second"] = data["copy_bytes_per_second"] / sum(data["bytes_per_point_step"].values())
     data["kernels"] = kernel_times(solver, seconds)
     del solver
@@ -81,6 +81,26 @@ def bench(scene, step_only=False, large=False, tell=lambda line: None, rounds=RO
     data["load"] = [*load, os.getloadavg()[0]]
     data["cpu_seconds"] = sum(os.times()[:4])
     return data
+
+
+def bytes_per_point_step(solver):
+    """Bytes read and written per point and step [B] by points, elements and nodes: dict.
+
+    What must come from memory and go back when nothing stays in the cache between passes, counted from the arrays. A
+    point's row is read and written in each of the two passes over the points, with its place in the order and its
+    soil's number; an element's record and a node's row are read once a pass.
+    """
+    points, mesh, passes = solver.n_points, solver.mesh, 2
+    row = solver.points[0].nbytes
+    of_points = passes * (2 * row + solver.order.itemsize + solver.soil_of_point.itemsize)
+    record = solver.geometry[0].nbytes + mesh.elements[0].nbytes + solver.occupied.itemsize + solver.start.itemsize
+    # contents are written by one pass, and read by both
+    of_elements = passes * record + 3 * solver.contents[0].nbytes
+    # written, read and cleared where a part of the mesh adds to a row; then read by the passes that interpolate
+    row_of_sums = solver.sums[0, 0].nbytes + solver.momenta[0, 0].nbytes
+    of_nodes = 3 * row_of_sums * np.count_nonzero(solver.touched) + (passes + 2) * solver.nodes.nbytes
+    occupied = np.count_nonzero(np.diff(solver.start))
+    return {"points": float(of_points), "elements": of_elements * occupied / points, "nodes": of_nodes / points}
 
 
 def _beside_reference(solver, rounds, seconds):

@@ -10,7 +10,7 @@ BLOCKS = ("made", "facts", "configurations", "threads", "kernels", "sizes", "sta
 def facts(data):
     """What was measured besides the tables: pairs of texts."""
     rate = {name: data[f"{name}_points_per_second"] / 1e6 for name in ("step", "reference", "roofline")}
-    counted, operations = data["bytes_per_point_step"], sum(data["operations_per_point_step"].values())
+    counted = data["bytes_per_point_step"]
     parts = ", ".join(f"{name} {number:.0f}" for name, number in counted.items())
     yield "scene, points, elements", f"{data['scene']}, {data['points']}, {data['elements']}"
     yield "running programs, before and after", f"{data['load'][0]:.1f}, {data['load'][1]:.1f}"
@@ -21,9 +21,6 @@ def facts(data):
     yield "bytes a point-step moves, as counted", f"{sum(counted.values()):.0f} ({parts})"
     yield "bound by memory, million point-steps a s", f"{rate['roofline']:.0f}"
     yield "step over that bound", f"{rate['step'] / rate['roofline']:.2f}"
-    yield "operations in the loops over points, all branches counted", str(operations)
-    yield "operations a byte", f"{operations / sum(counted.values()):.2f}"
-    yield "thousand million operations a s", f"{operations * rate['step'] / 1e3:.1f}"
     yield "memory of the solver, bytes a point", f"{data['bytes_per_point']:.0f}"
     if "start" not in data:
         return
