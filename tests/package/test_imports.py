@@ -21,7 +21,7 @@ ROOMS = (
 )  # fmt: skip
 #: The same of `verification`.
 MEASURING = (
-    "small_event", "synthetic_run", "pages", "child", "boxes", "driven", "monitor", "problems", "accuracy",
+    "small_event", "synthetic_run", "pages", "child", "boxes", "driven", "monitor", "loads", "problems", "accuracy",
     "sensitivity", "stability", "speed", "robustness", "reports", "published", "commands",
 )  # fmt: skip
 ORDERS = [("coupling", room) for room in ROOMS] + [("verification", room) for room in MEASURING]

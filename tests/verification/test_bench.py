@@ -46,10 +46,10 @@ def test_configurations_differ_in_what_they_leave_out():
     whole = small_scene().mpm
     scenes = dict(configurations(whole))
     assert scenes["dry, elastic"].water is None
-    assert {soil.model for soil in scenes["two-phase, elastic"].soils} == {"elastic"}
-    undamped = scenes["two-phase, Mohr-Coulomb, no filter or damping"].numerics
-    assert undamped.pressure_filter == undamped.stress_damping == 0
-    assert scenes["two-phase, Mohr-Coulomb"] == whole
+    assert {soil.model for soil in scenes["elastic"].soils} == {"elastic"}
+    assert scenes["no filter"].numerics.pressure_filter == scenes["no damping"].numerics.stress_damping == 0
+    assert not scenes["one time step"].numerics.local_time_stepping
+    assert scenes["full"] == whole
     assert len({str(scene) for scene in scenes.values()}) == len(scenes)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from mpm.solver import Solver
 from verification.boxes import STRESS, box_mesh, box_scene, inside, put, run_to, state
 from verification.driven import DrivenSolver
+from verification.loads import theory_pressures
 from verification.problems.problem import NUMERICS, WET, Problem, Result, register
 from verification.problems.two_phase import (
     NU,
@@ -125,16 +126,9 @@ def hydrostatics(size=0.35, size_growth=0.3, duration=0.05, points=3, lining="fi
 
     seconds = run_to(solver, duration, forget)
     (lining,) = solver.lining_pressures(solver.time - begin[0])
-    tunnel, soil, water = scene.tunnels[0], scene.soils[0], scene.water
-    angle = np.radians(lining["theta"])
-    depth = tunnel.axis_depth - tunnel.outer_radius * np.cos(angle)
-    buoyant = (1 - soil.porosity) * (soil.grain_density - water.density) * scene.gravity
-    k0 = soil.lateral_pressure_coefficient(buoyant * depth)
-    exact = {
-        "soil_pressure": buoyant * depth * (np.cos(angle) ** 2 + k0 * np.sin(angle) ** 2),
-        "water_pressure": water.density * scene.gravity * depth,
-    }
-    misses = {name: float(np.abs(lining[name] / value - 1).max()) for name, value in exact.items()}
+    theory = theory_pressures(scene, theta=lining["theta"]).isel(time=0)
+    names = ("soil_pressure", "water_pressure")
+    misses = {name: float(np.abs(lining[name] / theory[name].values - 1).max()) for name in names}
     # points are sorted on the way
     now, then = np.lexsort(state(solver, "x_initial", "y_initial").T), np.lexsort(places.T)
     change = np.abs(state(solver, *carried)[now] - before[then]).max()

@@ -18,38 +18,9 @@ from coupling.datasets import RunWriter
 from coupling.files.provenance import root_attributes
 from verification.boxes import run_to
 from verification.pages import DOCS, docs_page, made_by, table, write_data
+from verification.speed.stepping import FULL, variants
 
 BEGIN, ROUNDS, SPELL = 0.15, 12, 0.015  # simulated seconds after the gate opened, and of a round
-FULL, CROWN, TIGHT = "full", "gate at the crown, whole", "k = 1e-12 m/s"
-
-
-def variants(scene):
-    """Name, what is left out and how, name of the scene it is compared with, and the scene without it."""
-    elastic = tuple(soil.model_copy(update={"model": "elastic"}) for soil in scene.soils)
-    tight = tuple(soil.model_copy(update={"hydraulic_conductivity": 1e-12}) for soil in scene.soils)
-    smooth = tuple(tunnel.model_copy(update={"friction_coefficient": 0.0}) for tunnel in scene.tunnels)
-    unfiltered = scene.numerics.model_copy(update={"pressure_filter": 0.0})
-    undamped = scene.numerics.model_copy(update={"stress_damping": 0.0})
-    tied = scene.water.model_copy(update={"drainage": "undrained"})
-    crown = {"gate": scene.gate.model_copy(update={"angle": 0.0})}
-
-    def without(**changes):
-        return scene.model_copy(update=changes)
-
-    yield FULL, "nothing: two phases, Mohr-Coulomb, friction, filter, damping", FULL, scene
-    yield "dry", "the water: compiled out", FULL, without(water=None)
-    yield "elastic", "the return mapping: compiled out", FULL, without(soils=elastic)
-    yield "dry, elastic", "both", FULL, without(water=None, soils=elastic)
-    yield "no filter", "the pressure that nodes feel: not asked for", FULL, without(numerics=unfiltered)
-    yield "no damping", "what stress runs ahead by: not summed; longer steps", FULL, without(numerics=undamped)
-    yield "frictionless", "nothing: contacts with a coefficient of 0", FULL, without(tunnels=smooth)
-    yield TIGHT, "nothing: both velocities", FULL, without(soils=tight)
-    yield "undrained", "velocity and momentum of the water, drag: compiled out", TIGHT, without(water=tied)
-    yield "sink", "the inside of the tunnel: not meshed", FULL, without(interior="sink")
-    yield "no gate", "the gate and its fine mesh: not meshed; right half only", FULL, without(gate=None)
-    yield "no gate, whole", "the gate and its fine mesh: not meshed", FULL, without(gate=None, symmetry="whole")
-    yield CROWN, "nothing", CROWN, without(symmetry="whole", **crown)
-    yield "gate at the crown, half", "x < 0: neither meshed nor filled", CROWN, without(**crown)
 
 
 def snapshot_cost(scene):

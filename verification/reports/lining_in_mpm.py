@@ -14,9 +14,9 @@ import structure
 from coupling.datasets import cell_centres, cell_mean_weights
 from coupling.files.provenance import root_attributes
 from structure.response import FORCES, PRESSURES
+from verification.loads import theory_pressures
 from verification.pages import DOCS, docs_page, made_by, provenance, table, write_data
 from verification.problems import exact_rings
-from verification.reports.loads import theory_pressures
 from verification.speed.stepping import timed
 
 OTHER_K0 = 0.577  # 1 - sin(phi); the scenes have that of gravity loading

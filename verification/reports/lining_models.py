@@ -16,8 +16,8 @@ from coupling.scenes.scene import load_scene
 from structure import BeamSpringLining, ContinuumLining, LiningFailure
 from structure.response import FORCES
 from structure.theory import curved_section_moment
+from verification.loads import GATE, falling_pressures
 from verification.pages import DOCS, docs_page, made_by, picture, table
-from verification.reports.loads import GATE, falling_pressures
 
 IMAGES = DOCS / "images"
 WIDTH = 0.2  # of the gate [m]

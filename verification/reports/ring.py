@@ -18,9 +18,9 @@ from coupling.figures.utilisations import checks
 from coupling.scenes.scene import load_scene
 from structure import BeamSpringLining, Limits, check
 from structure.joint_laws import contact_moment, limited_shear
+from verification.loads import falling_pressures
 from verification.pages import DOCS, docs_page, made_by, picture, table
 from verification.problems import exact_rings
-from verification.reports.loads import falling_pressures
 
 STIFFNESS, HEIGHT, RECORDS = 5e8, 0.175, 1000  # N m/rad per metre, m
 LINEAR = {"law": "linear", "two_way": True}

@@ -18,21 +18,47 @@ LARGEST = 3e6
 OCCASIONAL = {"_sort_physically": "sorting", "_update_wave_speed": "spectrum"}
 
 
-def configurations(scene):
-    """Name and `mpm.Scene` of the configurations measured: all of the scene, and parts left out."""
+FULL, CROWN, TIGHT = "full", "gate at the crown, whole", "k = 1e-12 m/s"
+
+
+def variants(scene):
+    """Name, what is left out and how, name of the scene it is compared with, and the `mpm.Scene` without it."""
     elastic = tuple(soil.model_copy(update={"model": "elastic"}) for soil in scene.soils)
+    tight = tuple(soil.model_copy(update={"hydraulic_conductivity": 1e-12}) for soil in scene.soils)
+    smooth = tuple(tunnel.model_copy(update={"friction_coefficient": 0.0}) for tunnel in scene.tunnels)
+    tied = scene.water.model_copy(update={"drainage": "undrained"})
+
+    def without(**changes):
+        return scene.model_copy(update=changes)
 
     def numerics(**changes):
-        return scene.numerics.model_copy(update=changes)
+        return without(numerics=scene.numerics.model_copy(update=changes))
 
-    undamped = {"pressure_filter": 0.0, "stress_damping": 0.0}
-    yield "two-phase, Mohr-Coulomb", scene
-    yield "two-phase, Mohr-Coulomb, no filter or damping", scene.model_copy(update={"numerics": numerics(**undamped)})
-    yield "two-phase, elastic", scene.model_copy(update={"soils": elastic})
-    yield "dry, Mohr-Coulomb", scene.model_copy(update={"water": None})
-    yield "dry, elastic", scene.model_copy(update={"water": None, "soils": elastic})
-    one = {"local_time_stepping": False}
-    yield "two-phase, Mohr-Coulomb, one time step", scene.model_copy(update={"numerics": numerics(**one)})
+    yield FULL, "nothing: two phases, Mohr-Coulomb, friction, filter, damping", FULL, scene
+    yield "dry", "the water: compiled out", FULL, without(water=None)
+    yield "elastic", "the return mapping: compiled out", FULL, without(soils=elastic)
+    yield "dry, elastic", "both", FULL, without(water=None, soils=elastic)
+    yield "no filter", "the pressure that nodes feel: not asked for", FULL, numerics(pressure_filter=0.0)
+    yield "no damping", "what stress runs ahead by: not summed; longer steps", FULL, numerics(stress_damping=0.0)
+    yield "frictionless", "nothing: contacts with a coefficient of 0", FULL, without(tunnels=smooth)
+    yield TIGHT, "nothing: both velocities", FULL, without(soils=tight)
+    yield "undrained", "velocity and momentum of the water, drag: compiled out", TIGHT, without(water=tied)
+    yield "sink", "the inside of the tunnel: not meshed", FULL, without(interior="sink")
+    if scene.gate is None:
+        return
+    crown = {"gate": scene.gate.model_copy(update={"angle": 0.0})}
+    yield "no gate", "the gate and its fine mesh: not meshed; right half only", FULL, without(gate=None)
+    yield "no gate, whole", "the gate and its fine mesh: not meshed", FULL, without(gate=None, symmetry="whole")
+    yield CROWN, "nothing", CROWN, without(symmetry="whole", **crown)
+    yield "gate at the crown, half", "x < 0: neither meshed nor filled", CROWN, without(**crown)
+
+
+def configurations(scene):
+    """Name and `mpm.Scene` of what `gush bench` measures on the scene's own mesh: some variants, and one time step."""
+    chosen = (FULL, "dry", "elastic", "dry, elastic", "no filter", "no damping")
+    together = scene.numerics.model_copy(update={"local_time_stepping": False})
+    one = ("one time step", scene.model_copy(update={"numerics": together}))
+    return [(name, variant) for name, _, _, variant in variants(scene) if name in chosen] + [one]
 
 
 def prepared(mpm_scene, mesh, threads=1):

@@ -8,14 +8,17 @@ from structure.theory import theoretical_pressures
 GATE = 90.0  # degrees; pressures fall around it, gaussian 15 degrees wide
 
 
-def theory_pressures(scene, k0=None):
-    """Geostatic and hydrostatic pressures of an `mpm.Scene`, with its K0 unless another is given, one time."""
+def theory_pressures(scene, k0=None, theta=None):
+    """Geostatic and hydrostatic pressures of an `mpm.Scene`, with its K0 unless another is given, one time.
+
+    theta : angles [degree]; every degree when left out.
+    """
     tunnel, soil, water = scene.tunnels[0], scene.soils[0], scene.water
     buoyant = (1 - soil.porosity) * (soil.grain_density - water.density) * scene.gravity
     at_rest = soil.lateral_pressure_coefficient(buoyant * tunnel.axis_depth) if k0 is None else k0
     return theoretical_pressures(
         outer_diameter=tunnel.outer_diameter, cover=tunnel.cover, buoyant_unit_weight=buoyant,
-        coefficient_at_rest=at_rest, water_unit_weight=water.density * scene.gravity,
+        coefficient_at_rest=at_rest, water_unit_weight=water.density * scene.gravity, theta=theta,
     )  # fmt: skip
 
 
