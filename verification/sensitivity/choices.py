@@ -40,7 +40,7 @@ def of_quick(scene):
     return numerics(scene, (2.0, 1.4, 0.7)) | {
         "elements half as large but across the gate": meshes(scene, 0.5, 1.0),
         "pressure_filter 0.1": {"numerics.pressure_filter": 0.1},
-        "stress_damping 0.25": {"numerics.stress_damping": 0.25},
+        "stress_damping 0.5": {"numerics.stress_damping": 0.5},
         "pic_rate 100 /s": {"numerics.pic_rate": 100.0},
         "one time step for all elements": {"numerics.local_time_stepping": False},
         "K0 changed by a thousandth": {"soils.0.k0": k0 * 1.001},
