@@ -115,7 +115,7 @@ def test_page_keeps_what_is_written_by_hand_and_refuses_one_without_its_blocks(t
 
 def test_refined_scene_keeps_the_gate_in_whole_elements():
     scene = coupling.load_scene("case-3")
-    finer = coupling.load_scene("case-3", **meshes(scene, 0.5**0.5)).mpm.discretisation
+    finer = coupling.load_scene("case-3", **meshes(scene, 0.5**0.5)).discretisation
     assert finer.elements_across_gate == 11 and finer.element_size == pytest.approx(0.75 * 0.5**0.5)
     assert meshes(scene, 4.0)["discretisation.elements_across_gate"] == 2
 

@@ -114,7 +114,7 @@ def hydrostatics(size=0.35, size_growth=0.3, duration=0.05, points=3, lining="fi
         discretisation={
             "element_size": 3.0, "element_size_lining": size, "size_growth": size_growth, "points_per_element": points,
         },
-    ).mpm  # fmt: skip
+    )  # fmt: skip
     solver = Solver(scene, build_mesh(scene), threads=1)
     solver.relax()
     carried = (*STRESS[:3], "pore_pressure")

@@ -37,7 +37,7 @@ PICTURES = ("fields", "pressures", "internal_forces", "inflow")
 def measured(folder):
     """The numbers of the report: list of (what, wanted, value as text, met or None), and the same as a dict."""
     history, pressures, mesh = read_history(folder), read_pressures(folder), read_mesh(folder)
-    scene = coupling.load_scene(Path(folder) / "scene.toml").mpm
+    scene = coupling.load_scene(Path(folder) / "scene.toml")
     gate, rows, data = scene.gate.angle, [], {}
 
     def row(key, what, wanted, value, met, text):

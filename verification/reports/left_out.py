@@ -25,12 +25,12 @@ BEGIN, ROUNDS, SPELL = 0.15, 12, 0.015  # simulated seconds after the gate opene
 
 def snapshot_cost(scene):
     """Processor time [s] and bytes in the file of the first snapshot of the points, its copy included."""
-    simulation = mpm.Simulation(scene.mpm, threads=1)
+    simulation = mpm.Simulation(scene, threads=1)
     record = simulation.begin()
     seconds, sizes = [], []
     with tempfile.TemporaryDirectory() as folder:
         for kept in (None, record.points):
-            writer = RunWriter(Path(folder) / "run.nc", root_attributes(scene), scene.mpm)
+            writer = RunWriter(Path(folder) / "run.nc", root_attributes(scene), scene)
             begin = clock.process_time()
             if kept is not None:
                 simulation.solver.points_by_name()
@@ -101,7 +101,7 @@ def blocks(data):
 
 def main():
     page, scene = docs_page("left-out", "made", "rows", "snapshot"), coupling.load_scene("case-3")
-    rows, full = measure(scene.mpm)
+    rows, full = measure(scene)
     seconds, size = snapshot_cost(scene)
     data = {"rows": rows, "snapshot": {"seconds": seconds, "bytes": size}, "contact_nodes": full.n_contact,
             "nodes": len(full.mesh.nodes)}  # fmt: skip

@@ -183,9 +183,9 @@ def of_elastic(scene, mesh):
 
 def measure():
     """All numbers of the page."""
-    source = coupling.load_scene("quick", initial_contact="bonded", output={"interval": 0.01})
-    scene, ring = source.mpm, source.ring
-    mesh, fine = mpm.build_mesh(scene), coupling.load_scene("case-3", initial_contact="bonded").mpm
+    scene = coupling.load_scene("quick", initial_contact="bonded", output={"interval": 0.01})
+    fine = coupling.load_scene("case-3", initial_contact="bonded")
+    mesh, ring = mpm.build_mesh(scene), scene.ring
     alone = ring.model_copy(update={"joint_angles": (), "ground": None, "support": "invert"})
     data = {"events": {kind: of_event(kind, scene, mesh, ring, alone) for kind in KINDS}}
     data["why"], data["harmonics"] = of_elastic(scene, mesh), {}

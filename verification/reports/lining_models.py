@@ -26,7 +26,7 @@ MOVED = (*FORCES, "displacement_radial", "joint_rotation")
 
 def cost(scene):
     """CPU seconds of both models for 1000 times, construction included."""
-    loads, rows = falling_pressures(scene.mpm, 1000), []
+    loads, rows = falling_pressures(scene, 1000), []
     for name, model in {"beam-spring": BeamSpringLining, "continuum": ContinuumLining}.items():
         begin = clock.process_time()
         model(scene.ring).respond(loads)
@@ -36,7 +36,7 @@ def cost(scene):
 
 def difference_table(scene):
     """The table of `gush compare`, and its pictures."""
-    source = SimpleNamespace(ring=scene.ring, pressures=falling_pressures(scene.mpm, 100), file="synthetic")
+    source = SimpleNamespace(ring=scene.ring, pressures=falling_pressures(scene, 100), file="synthetic")
     comparison, rows = compare(source), []
     for row in comparison.rows:
         where = f"joint {row['joint']}" if row["theta"] is None else f"{row['theta']:g}°"
@@ -55,7 +55,7 @@ def changes(one, other):
 
 def open_gate(scene):
     """What neglecting the gate costs, for holes of some shares of the tunnel's length."""
-    loads, rows = falling_pressures(scene.mpm, 2), []
+    loads, rows = falling_pressures(scene, 2), []
     whole = ContinuumLining(scene.ring).respond(loads)
     for cut in (0.05, 1 / 6, 0.5, 0.9, 1.0):
         try:
@@ -70,7 +70,7 @@ def open_gate(scene):
 
 def joint_details(scene):
     """What grooves and bolts change of the plain ring, and the largest hoop stress near joint 2."""
-    loads, rows, plain = falling_pressures(scene.mpm, 2).isel(time=[1]), [], None
+    loads, rows, plain = falling_pressures(scene, 2).isel(time=[1]), [], None
     groove, bolts = {"groove": (0.05, 0.04, 0.02)}, {"bolts": (-0.05, 0.4, 2e8)}
     cases = {"plain": {}, "groove 50/40/20 mm": groove, "bolts 200 MN/m per m": bolts, "both": groove | bolts}
     for label, options in cases.items():
@@ -86,7 +86,7 @@ def joint_details(scene):
 
 def error_over_time(scene):
     """Error of M and of the radial displacement against CPU seconds for 50 times, over element counts."""
-    loads = falling_pressures(scene.mpm, 50)
+    loads = falling_pressures(scene, 50)
 
     @cache
     def reference(n_angles):
@@ -154,7 +154,7 @@ def _draw_errors(curves):
 def joint_stresses(scene):
     """Hoop stress around joint 2, where the ring opens on the outside."""
     model = ContinuumLining(scene.ring, columns=720, layers=6)
-    stress = model.stress_field(falling_pressures(scene.mpm, 2).isel(time=[1])).isel(time=0)
+    stress = model.stress_field(falling_pressures(scene, 2).isel(time=[1])).isel(time=0)
     mesh = model.mesh
     nodes = mesh.element_nodes()[:4]
     corners = np.stack([mesh.node_radius * np.sin(mesh.node_angle), mesh.node_radius * np.cos(mesh.node_angle)], axis=1)

@@ -45,7 +45,7 @@ def case_ring(scene, changes, ground):
 
 def costs(scene, records):
     """CPU time, factorisations and residual of every case, for so many records."""
-    pressures = falling_pressures(scene.mpm, records, share=0.8)
+    pressures = falling_pressures(scene, records, share=0.8)
     BeamSpringLining(case_ring(scene, {}, {})).respond(pressures.isel(time=slice(2)))  # what loads on first use
     for name, (changes, ground) in CASES.items():
         model = BeamSpringLining(case_ring(scene, changes, ground))
@@ -121,7 +121,7 @@ def joint_laws(path):
 def example_of_checks(scene, limits):
     """The checks of the ring with joints that gape whose pressures fall around the right waist."""
     ring = case_ring(scene, {"joint_normal_stiffness": 2e10, "joint_contact_height": HEIGHT}, {})
-    pressures = falling_pressures(scene.mpm, 60, share=0.8)
+    pressures = falling_pressures(scene, 60, share=0.8)
     return checks(check(BeamSpringLining(ring).respond(pressures), limits))
 
 

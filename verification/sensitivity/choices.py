@@ -36,7 +36,7 @@ def numerics(scene, factors):
 
 def of_quick(scene):
     """Numerical choices of the coarse scene, its meshes among them."""
-    k0 = scene.mpm.soils[0].elastic_k0
+    k0 = scene.soils[0].elastic_k0
     return numerics(scene, (2.0, 1.4, 0.7)) | {
         "elements half as large but across the gate": meshes(scene, 0.5, 1.0),
         "pressure_filter 0.1": {"numerics.pressure_filter": 0.1},

@@ -26,7 +26,7 @@ def measured(name, variants, folder, workers=None, tell=print):
     """Rows of the tables: name of a quantity to (n_variants,) values, of the last mark, the times of all of them."""
     marks, scene = MARKS[name], coupling.load_scene(name)
     data = run_variants(name, variants, marks[-1], folder, workers, tell, **FIXED)
-    found = [quantities(data, mark, scene.mpm.gate.angle) for mark in marks]
+    found = [quantities(data, mark, scene.gate.angle) for mark in marks]
     times = {key: values for state in found for key, values in state.items() if key.startswith("time to")}
     seconds = data["cpu_seconds"].values
     last = data["time"].max("progress").values  # [s], also of runs that did not reach the last mark
@@ -95,7 +95,7 @@ def beside_seepage(name, variants, found):
         if set(changes) <= {key}:
             conductivity = changes.get(key, value_at(scene, key))
             rate = (last - first) / (end[k] - begin[k])
-            rows.append((what, f"{rate:.0f}", f"{seepage(scene.mpm, conductivity):.3g}"))
+            rows.append((what, f"{rate:.0f}", f"{seepage(scene, conductivity):.3g}"))
     head = ("ground and water, first to last mark kg/m/s", "water through ground that rests kg/m/s")
     return table(("changed", *head), rows)
 

@@ -29,7 +29,7 @@ def scene_ladder(name, inflow_mass, out, tell, factors=FACTORS):
     scene = coupling.load_scene(name)
     variants = {f"mesh {factor:.3f}": meshes(scene, factor) for factor in factors}
     data = run_variants(name, variants, inflow_mass, Path(out) / "runs", tell=tell)
-    gate = scene.mpm.gate.angle
+    gate = scene.gate.angle
     found = {share * inflow_mass: quantities(data, share * inflow_mass, gate) for share in SHARES}
     return write_ladder(scene.name, np.array(factors), found, data["cpu_seconds"].values, Path(out))
 

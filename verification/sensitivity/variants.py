@@ -18,7 +18,7 @@ def meshes(scene, factor, across=None):
 
     across : factor of the number of elements across the gate; they are whole and at least two.
     """
-    mesh = scene.mpm.discretisation
+    mesh = scene.discretisation
     lengths = ("element_size", "element_size_lining", "element_size_interior", "size_growth")
     changes = {f"discretisation.{name}": getattr(mesh, name) * factor for name in lengths}
     count = mesh.elements_across_gate * (1.0 / factor if across is None else across)
@@ -27,7 +27,7 @@ def meshes(scene, factor, across=None):
 
 def value_at(scene, name):
     """Value of a scene under a dotted name."""
-    value = scene.mpm
+    value = scene
     for part in name.split("."):
         value = value[int(part)] if part.isdecimal() else getattr(value, part)
     return value
@@ -50,7 +50,7 @@ def run_variants(name, variants, inflow_mass, folder, workers=None, tell=None, *
         Of :func:`coupling.study`, `case_name` being what is varied.
     """
     scene = coupling.load_scene(name)
-    if scene.mpm.gate is None or scene.ring is None:
+    if scene.gate is None or scene.ring is None:
         raise Refused(f"scene: a mesh ladder needs a gate and a ring, got {name!r} without; add [gate] and [ring]")
     changed = dict.fromkeys(key for changes in variants.values() for key in changes)
     parameters = {key: [changes.get(key, value_at(scene, key)) for changes in variants.values()] for key in changed}

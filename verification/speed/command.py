@@ -55,8 +55,8 @@ def bench(scene, step_only=False, large=False, tell=lambda line: None, rounds=RO
     import mpm
 
     load = [os.getloadavg()[0]]
-    mesh = mpm.build_mesh(scene.mpm)
-    solver = prepared(scene.mpm, mesh)
+    mesh = mpm.build_mesh(scene)
+    solver = prepared(scene, mesh)
     data = {"scene": scene.name, **_beside_reference(solver, rounds, seconds)}
     data["elements"] = len(mesh.elements)
     data["bytes_per_point"] = solver.memory_bytes() / solver.n_points
@@ -66,10 +66,10 @@ def bench(scene, step_only=False, large=False, tell=lambda line: None, rounds=RO
     del solver
     if not step_only:
         tell("what a scene has and has not")
-        data["configurations"] = _configurations(scene.mpm, mesh, seconds)
-        data["threads"] = _threads(scene.mpm, mesh, rounds, seconds)
+        data["configurations"] = _configurations(scene, mesh, seconds)
+        data["threads"] = _threads(scene, mesh, rounds, seconds)
         tell("sizes")
-        data["sizes"] = size_ladder(scene.mpm, [*SIZES, LARGEST] if large else SIZES, FEW_SECONDS)
+        data["sizes"] = size_ladder(scene, [*SIZES, LARGEST] if large else SIZES, FEW_SECONDS)
         data["size_slope"] = slope(data["sizes"])
         tell("starts")
         data["imports"] = processes.import_seconds()
@@ -120,10 +120,10 @@ def _beside_reference(solver, rounds, seconds):
     }  # fmt: skip
 
 
-def _configurations(mpm_scene, mesh, seconds):
+def _configurations(scene, mesh, seconds):
     rows = []
-    for name, scene in configurations(mpm_scene):
-        solver = prepared(scene, mesh)
+    for name, variant in configurations(scene):
+        solver = prepared(variant, mesh)
         per_second, _, simulated = max(rate(solver, 0.5 * seconds) for _ in range(2))
         rows.append({
             "configuration": name, "points_per_second": per_second, "simulated_per_cpu_second": simulated,
@@ -132,8 +132,8 @@ def _configurations(mpm_scene, mesh, seconds):
     return rows
 
 
-def _threads(mpm_scene, mesh, rounds, seconds):
-    solvers = [prepared(mpm_scene, mesh, threads) for threads in (1, None)]
+def _threads(scene, mesh, rounds, seconds):
+    solvers = [prepared(scene, mesh, threads) for threads in (1, None)]
     best = [(0.0, 0.0) for _ in solvers]
     for _ in range(rounds):  # in turns, as above
         for k, solver in enumerate(solvers):

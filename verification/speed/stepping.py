@@ -61,10 +61,10 @@ def configurations(scene):
     return [(name, variant) for name, _, _, variant in variants(scene) if name in chosen] + [one]
 
 
-def prepared(mpm_scene, mesh, threads=1):
+def prepared(scene, mesh, threads=1):
     """A solver with its gate open that has stepped until its kernels are compiled and its points are spread."""
-    solver = mpm.Solver(mpm_scene, mesh, threads)
-    if mpm_scene.gate is not None:
+    solver = mpm.Solver(scene, mesh, threads)
+    if scene.gate is not None:
         solver.open_gate()
     solver.step()
     timed(lambda: steps(solver), SECONDS_OF_WARM_UP)
