@@ -10,7 +10,6 @@ from running import gush
 import coupling
 from verification.accuracy.ladders import assess, dataset, measure
 from verification.accuracy.orders import excess_over_front, extrapolate, observed_order, pareto_front
-from verification.pages import Page
 from verification.problems.problem import Problem, Result
 from verification.sensitivity.inflow import error_bars, measured_table, spread
 from verification.sensitivity.mesh import scene_ladder, write_ladder
@@ -100,17 +99,6 @@ def test_command_writes_page_data_and_pictures(tmp_path, monkeypatch):
         assert stored.sizes["run"] == 9
     result = gush("accuracy", "parabol", "--out", tmp_path)
     assert result.exit_code == 2 and "did you mean 'parabola'" in result.output
-
-
-def test_page_keeps_what_is_written_by_hand_and_refuses_one_without_its_blocks(tmp_path):
-    path = tmp_path / "page.md"
-    Page(path, "Title", ["one", "two"]).fill({"one": "first", "two": ["a", "b"]})
-    text = path.read_text().replace("# Title\n", "# Title\n\nBy hand.\n")
-    path.write_text(text)
-    Page(path, "Title", ["one"]).fill({"one": r"\1 anew"})
-    assert path.read_text() == text.replace("first", r"\1 anew") and "By hand." in text
-    with pytest.raises(ValueError, match="must mark the block 'three'"):
-        Page(path, "Title", ["three"])
 
 
 def test_refined_scene_keeps_the_gate_in_whole_elements():

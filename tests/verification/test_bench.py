@@ -1,15 +1,13 @@
 """What `gush bench` says about a step adds up, and its counts are those of the arrays and the source."""
 
-import json
 import math
 
 import numpy as np
 import pytest
 
 import mpm
-from verification.pages import DOCS, Page
 from verification.small_event import small_scene
-from verification.speed import processes, report
+from verification.speed import processes
 from verification.speed.command import bench, bytes_per_point_step
 from verification.speed.stepping import configurations, kernel_times, prepared, slope
 
@@ -67,17 +65,3 @@ def test_step_is_measured_beside_the_reference_and_the_copy():
 def test_solver_is_imported_within_a_third_of_a_second_of_numba():
     """Processor time; the limit is 0.3 s, and an import that compiles or meshes takes seconds."""
     assert processes.import_seconds(["mpm over numba"])["mpm over numba"] < 0.3
-
-
-def test_page_is_that_of_its_stored_numbers_and_keeps_what_is_written_by_hand(tmp_path):
-    text, data = (DOCS / "performance.md").read_text(), json.loads((DOCS / "performance.json").read_text())
-    (tmp_path / "performance.md").write_text(text)
-    page = report.bench_page(tmp_path)
-    blocks = report.blocks(data)
-    page.fill({name: lines for name, lines in blocks.items() if name != "made"})
-    assert (tmp_path / "performance.md").read_text() == text
-    page = Page(tmp_path / "performance.md", "Performance", ["study"])
-    page.fill({"study": report.study_block(data["study"] | {"share_of_loop": 0.123})})
-    changed = (tmp_path / "performance.md").read_text()
-    assert "takes 0.12 of the faster loop" in changed
-    assert changed.split("<!-- study -->")[0] == text.split("<!-- study -->")[0]

@@ -68,7 +68,7 @@ def write(page, data, linear):
         blocks["map"] = [*_families(data["linear"]), "", "![Critical Courant number](images/stability-map.png)", "",
                          *_reading(linear)]  # fmt: skip
     if data["extremes"]:
-        blocks["extremes"] = _extremes(data["extremes"])
+        blocks["extremes"] = extremes_block(data["extremes"])
     return sorted([*paths, page.fill(blocks)])
 
 
@@ -126,7 +126,8 @@ def _described(part):
     return "; ".join(rows[:4]) + ("; .." if len(rows) > 4 else "") if rows else "none"
 
 
-def _extremes(verdicts):
+def extremes_block(verdicts):
+    """Lines about the verdicts, dicts of :class:`verification.stability.verdicts.Verdict`."""
     counts = {name: sum(v["verdict"] == name for v in verdicts) for name in (STABLE, REFUSED, BUG)}
     said = ", ".join(f"{counts[name]} {name}{'s' * (name == BUG)}" for name in counts)
     rows = []
