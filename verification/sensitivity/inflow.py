@@ -59,7 +59,8 @@ def error_bars(variants, found):
     finest = sorted(scaled, key=scaled.get)[:4]
     meshes = [names.index(what) for what in finest]
     others = [k for k, what in enumerate(names) if what not in (*scaled, *COARSER) and not what.startswith("water")]
-    zeros = at_size_zero([scaled[what] for what in finest], {key: values[meshes] for key, values in found.items()})
+    asked = {key: values[meshes] for key, values in found.items() if key.endswith("]")}  # what a run costs is no answer
+    zeros = at_size_zero([scaled[what] for what in finest], asked)
     rows = []
     for name, zero in zeros.items():
         here = found[name][0]

@@ -5,7 +5,7 @@ import numpy as np
 import coupling
 from coupling.refused import Refused
 from structure.response import FORCES, SHOWN
-from verification.accuracy.orders import extrapolate
+from verification.accuracy.orders import Extrapolation, extrapolate
 
 RECORDS = 101  # inflow masses of the study, from 0 to the last
 LATE = 0.9  # of an inflow mass: states are means from there on, since pressures of single records ring
@@ -112,5 +112,9 @@ def _unevenness(soil, theta, gate):
 
 
 def at_size_zero(size, found):
-    """Quantities of several mesh sizes extrapolated: name to :class:`verification.accuracy.orders.Extrapolation`."""
-    return {name: extrapolate(size, values) for name, values in found.items()}
+    """Quantities of several mesh sizes extrapolated: name to :class:`verification.accuracy.orders.Extrapolation`.
+
+    NaN where one of the meshes has no value: a run that did not reach the inflow mass.
+    """
+    unknown = Extrapolation(np.nan, np.nan, np.nan, np.nan)
+    return {k: extrapolate(size, values) if np.isfinite(values).all() else unknown for k, values in found.items()}
