@@ -231,8 +231,13 @@ def path_error(element, planes, rates, increments):
     return worst / scale
 
 
-def random_paths(increments, friction_angle, dilatancy_angle, tensile_strength, mean, paths=40, pieces=4, seed=1):
-    """Zigzag strain paths through planes, edges and cut-off against the event-by-event solution."""
+def random_paths(
+    mean, increments=64, friction_angle=30.0, dilatancy_angle=10.0, tensile_strength=5e3, paths=40, pieces=4, seed=1,
+):  # fmt: skip
+    """Zigzag strain paths through planes, edges and cut-off against the event-by-event solution.
+
+    mean : volumetric strain rate that they are drawn to [1/s]: below zero under pressure, above until tension is cut.
+    """
     cohesion = 2e4
     element = Element(cohesion, friction_angle, dilatancy_angle, tensile_strength)
     planes = yield_planes(cohesion, friction_angle, dilatancy_angle, element.parameters[6])
@@ -241,21 +246,12 @@ def random_paths(increments, friction_angle, dilatancy_angle, tensile_strength, 
     return Result(error, steps=increments * pieces, points=paths, cpu_seconds=seconds)
 
 
-def zigzag(increments=64, friction_angle=30.0, dilatancy_angle=10.0):
-    """Paths under pressure: planes and both edges."""
-    return random_paths(increments, friction_angle, dilatancy_angle, 1e8, mean=-2e-3)
-
-
-def opening(increments=64, friction_angle=30.0, dilatancy_angle=10.0, tensile_strength=5e3):
-    """Paths that expand until the tensile strength caps one, two and three principal stresses."""
-    return random_paths(increments, friction_angle, dilatancy_angle, tensile_strength, mean=4e-3)
-
-
 register(Problem(
     name="zigzag", title="random zigzag strain paths under pressure, over planes and both edges",
     source="Koiter (1953), Quart. Appl. Math. 11: rate form, integrated from event to event",
     norm="largest stress error at the ends of the pieces over the largest stress of all paths",
-    solve=zigzag, fast={"increments": 64, "friction_angle": 30.0, "dilatancy_angle": 10.0},
+    solve=partial(random_paths, -2e-3, tensile_strength=1e8),
+    fast={"increments": 64, "friction_angle": 30.0, "dilatancy_angle": 10.0},
     ladder={
         "increments": (4, 16, 64, 256), "friction_angle": (10.0, 30.0, 40.0), "dilatancy_angle": (0.0, 10.0, 30.0),
     },
@@ -267,7 +263,7 @@ register(Problem(
     name="tension-cut-off", title="random strain paths that expand to the tensile strength and to the apex",
     source="Koiter (1953), Quart. Appl. Math. 11, with Rankine planes and associated flow in tension",
     norm="largest stress error at the ends of the pieces over the largest stress of all paths",
-    solve=opening, fast={"increments": 256, "friction_angle": 30.0, "dilatancy_angle": 10.0},
+    solve=partial(random_paths, 4e-3), fast={"increments": 256, "friction_angle": 30.0, "dilatancy_angle": 10.0},
     ladder={"increments": (4, 16, 64, 256), "tensile_strength": (0.0, 5e3, 1e8)},
     limit=0.02,
     why="first order where cone and cut-off meet",
