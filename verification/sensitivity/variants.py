@@ -54,13 +54,13 @@ def run_variants(name, variants, inflow_mass, folder, workers=None, tell=None, *
         raise Refused(f"scene: a mesh ladder needs a gate and a ring, got {name!r} without; add [gate] and [ring]")
     changed = dict.fromkeys(key for changes in variants.values() for key in changes)
     parameters = {key: [changes.get(key, value_at(scene, key)) for changes in variants.values()] for key in changed}
+    if len(set(zip(*parameters.values(), strict=True))) < len(variants):
+        raise Refused(f"variants: must differ in what they change, got {', '.join(variants)}; leave one out")
     plan = {
         "name": f"{scene.name}-variants", "scene": str(name), "design": "list", "records": RECORDS,
         "fixed": {"stop.inflow_mass": inflow_mass, **fixed}, "parameters": parameters,
     }  # fmt: skip
     data = coupling.study(plan, folder, workers=workers, progress=tell)
-    if data.sizes["case"] != len(variants):
-        raise Refused(f"variants: must differ, got {len(variants)} of {data.sizes['case']} scenes; leave one out")
     return data.assign_coords(case_name=("case", list(variants)))
 
 
