@@ -135,6 +135,9 @@ CLAMPS = {
     "returned_to_mesh": "put back onto a wall",
 }
 
+#: Least and largest porosity that a point may have.
+POROSITY_FLOOR, POROSITY_CEILING = 0.05, 0.90
+
 #: What the nodes add up over all steps, to compare with the state of the points.
 LEDGER = (
     Field("momentum_x", "N s/m", "change of the momentum"),

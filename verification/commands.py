@@ -25,22 +25,22 @@ def accuracy_command(
 ):
     """Error against processor time over mesh size, time step and numerical options; a page, data and pictures.
 
-    JSON: see `verification.accuracy.report.write`; with --scene `verification.accuracy.ladder_report.write_ladder`.
+    JSON: see `verification.accuracy.report.problem_ladders`; with --scene `verification.sensitivity.mesh.write_ladder`.
     """
     with failures(), checked_json(json_path):
-        from verification.accuracy.command import problem_ladders, scene_ladder
+        from verification.accuracy.report import problem_ladders
+        from verification.sensitivity.mesh import scene_ladder
 
         tell = Console(stderr=True).print
         if scene is not None:
             data = scene_ladder(scene, inflow_mass, out, tell)
         else:
             data = problem_ladders(problems or [], fast, out, tell)
-        write_json(json_path, data)
-        if str(json_path) != "-":
-            console = Console()
-            if scene is None:
-                console.print(_accuracy_table(data))
-            console.print(f"page: {data['page']}", highlight=False, soft_wrap=True)
+        table = Table("problem", "error", "limit", "CPU s", "default over the best of what costs no more")
+        for name, row in data.get("problems", {}).items():
+            limit = f"{row['limit']:.2g}" if row["within"] else f"[red]{row['limit']:.2g} exceeded[/red]"
+            table.add_row(name, f"{row['error']:.2e}", limit, f"{row['cpu_seconds']:.2f}", f"{row['excess']:.2f}")
+        _show(json_path, data, [table] * (scene is None), [f"page: {data['page']}"])
 
 
 def bench_command(
@@ -60,42 +60,20 @@ def bench_command(
     with failures(), checked_json(json_path):
         from coupling.scenes.scene import load_scene
         from verification.speed.command import bench
-        from verification.speed.report import write
+        from verification.speed.report import bench_page, facts, write
 
+        page = None if out is None else bench_page(out)
         data = bench(load_scene(scene), step, large, Console(stderr=True).print)
-        data["files"] = write(data, out) if out is not None else []
-        write_json(json_path, data)
-        if str(json_path) != "-":
-            console = Console()
-            console.print(_bench_table(data))
-            for path in data["files"]:
-                console.print(path, highlight=False, soft_wrap=True)
-
-
-def _bench_table(data):
-    table = Table("measured", "", title=f"{data['scene']}, {data['points']} points, load {data['load'][0]:.1f}")
-    for name, value in (
-        ("two-phase step of this program", data["step_points_per_second"]),
-        ("plain one-phase reference loop", data["reference_points_per_second"]),
-        ("bound by memory, bytes as counted", data["roofline_points_per_second"]),
-        *((row["configuration"], row["points_per_second"]) for row in data.get("configurations", ())),
-        *((f"{row['points']} points in a box", row["points_per_second"]) for row in data.get("sizes", ())),
-    ):
-        table.add_row(name, f"{value / 1e6:.2f} M point-steps per CPU s")
-    table.add_row("step over reference", f"{data['step_to_reference_ratio']:.2f}")
-    for name, seconds in data["kernels"].items():
-        table.add_row(f"kernel {name}", f"{1e9 * seconds:.1f} ns a point-step")
-    table.add_row("memory", f"{data['bytes_per_point']:.0f} bytes a point")
-    if "start" in data:
-        table.add_row("cost over size", f"power {data['size_slope']:.2f}")
-        table.add_row(
-            f"{data['threads'][-1]['threads']} threads", f"{data['threads'][-1]['speed_up']:.2f} times as fast"
-        )
-        table.add_row("first step of gush run quick, warm", f"{data['first_step_wall_seconds']:.1f} s by the clock")
-        table.add_row("compilation", f"{data['start']['compilation']:.1f} CPU s, once")
-        share = data["throughput"]
-        table.add_row(f"{share['runs']} runs at once", f"{share['share_of_ideal']:.2f} of the ideal throughput")
-    return table
+        data["files"] = write(data, page) if page is not None else []
+        table = Table("measured", "")
+        for row in facts(data):
+            table.add_row(*row)
+        for row in (*data.get("configurations", ()), *data.get("sizes", ())):
+            what = row.get("configuration", f"{row.get('points')} points in a box")
+            table.add_row(f"{what}, million point-steps a CPU s", f"{row['points_per_second'] / 1e6:.2f}")
+        for name, seconds in data["kernels"].items():
+            table.add_row(f"kernel {name}, ns a point-step", f"{1e9 * seconds:.1f}")
+        _show(json_path, data, [table], data["files"])
 
 
 def stability_command(
@@ -106,20 +84,14 @@ def stability_command(
 ):
     """Critical time step, predicted against exact, and runs at the edge of what a scene can ask for.
 
-    JSON: keys of `verification.stability.command.stability`. Exit code 3 when one of its `faults` is found.
+    JSON: keys of `verification.stability.report.stability`. Exit code 3 when one of its `faults` is found.
     """
     with failures(), checked_json(json_path):
-        from verification.stability.command import stability, tables
+        from verification.stability.report import shown_tables, stability
 
         with ProgressLine() as line:
             data = stability(case or [], linear, out, Console(stderr=True).print, line.say)
-        write_json(json_path, data)
-        if str(json_path) != "-":
-            console = Console()
-            for table in tables(data):
-                console.print(table)
-            for path in data["files"]:
-                console.print(path, highlight=False, soft_wrap=True)
+        _show(json_path, data, shown_tables(data), data["files"])
     if data["faults"]:
         complain("\n".join(data["faults"]), FAILED)
 
@@ -147,17 +119,12 @@ def published_command(
 
         studies = [] if page_only else run_all(out, coarse, workers, scheduler, Console(stderr=True))
         data = write_page(out, page if page is not None else out) | {"studies": studies}
-        write_json(json_path, data)
-        if str(json_path) != "-":
-            table = Table("statement", "published", "here", "agrees")
-            for row in data["answers"]:
-                verdict = {True: "yes", False: "[red]no[/red]", None: ""}[row["agrees"]]
-                table.add_row(*(row[name].replace("[", "\\[") for name in ("statement", "published", "ours")), verdict)
-            console = Console()
-            console.print(table)
-            if data["missing"]:
-                console.print(f"not finished: {', '.join(data['missing'])}", highlight=False)
-            console.print(f"page: {data['page']}", highlight=False, soft_wrap=True)
+        table = Table("statement", "published", "here", "agrees")
+        for row in data["answers"]:
+            verdict = {True: "yes", False: "[red]no[/red]", None: ""}[row["agrees"]]
+            table.add_row(*(row[name].replace("[", "\\[") for name in ("statement", "published", "ours")), verdict)
+        missing = [f"not finished: {', '.join(data['missing'])}"] if data["missing"] else []
+        _show(json_path, data, [table], [*missing, f"page: {data['page']}"])
         if any(case["status"] == "failed" for one in studies for case in one["cases"]):
             raise typer.Exit(FAILED)
 
@@ -175,15 +142,15 @@ def figures_command(
         from verification.published.draw import draw_study
 
         figures = {number: str(path) for number, path in draw_study(study, out or study / "figures").items()}
-        write_json(json_path, {"figures": figures})
-        if str(json_path) != "-":
-            for number, path in figures.items():
-                Console().print(f"figure {number}: {path}", highlight=False, soft_wrap=True)
+        _show(json_path, {"figures": figures}, [], [f"figure {number}: {path}" for number, path in figures.items()])
 
 
-def _accuracy_table(data):
-    table = Table("problem", "error", "limit", "CPU s", "default over the best of what costs no more")
-    for name, row in data["problems"].items():
-        limit = f"{row['limit']:.2g}" if row["within"] else f"[red]{row['limit']:.2g} exceeded[/red]"
-        table.add_row(name, f"{row['error']:.2e}", limit, f"{row['cpu_seconds']:.2f}", f"{row['excess']:.2f}")
-    return table
+def _show(json_path, data, tables, lines):
+    """Write the JSON; unless that is what is printed, print tables and lines."""
+    write_json(json_path, data)
+    if str(json_path) != "-":
+        console = Console()
+        for table in tables:
+            console.print(table)
+        for line in lines:
+            console.print(line, highlight=False, soft_wrap=True)

@@ -1,27 +1,107 @@
-"""What report pages share: the folder of the docs, and the line that says how, when and where a page was made."""
+"""Report pages: Markdown written by hand, in which commands replace the blocks between two comments that name them."""
 
+import json
 import os
 import platform
+import re
 import sys
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
 from coupling.files.provenance import revision
+from coupling.refused import Refused
 
 #: Docs of the working copy this code runs from; an installed program has none.
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 
 
-def need_docs():
-    """Leave with a message where there are no docs to write into, before the work instead of after it."""
+class Page:
+    """A page with generated blocks, each from `<!-- NAME -->` to `<!-- end of NAME -->`; the rest is written by hand.
+
+    Parameters
+    ----------
+    path : path
+    title : str
+        Heading of a page that is not there yet; it begins as the heading and all blocks, in their order.
+    blocks : sequence of str
+
+    Raises
+    ------
+    coupling.refused.Refused
+        The page is there and lacks a block: before the work that would fill it.
+    """
+
+    def __init__(self, path, title, blocks):
+        self.path = Path(path)
+        if self.path.is_file():
+            self.text = self.path.read_text(encoding="utf-8")
+        else:
+            self.text = f"# {title}\n" + "".join(f"\n{_begin(name)}{_end(name)}\n" for name in blocks)
+        for name in blocks:
+            if _begin(name) not in self.text or _end(name) not in self.text:
+                raise Refused(
+                    f"{self.path}: must mark the block {name!r} by '{_begin(name).strip()}' and '{_end(name)}', got "
+                    "none; mark it, or move the page away"
+                )
+
+    def fill(self, blocks):
+        """Replace blocks, name to lines of text, and write the page; returns its path as text."""
+        for name, lines in blocks.items():
+            text = "\n".join([lines] if isinstance(lines, str) else lines).strip("\n")
+            block = re.escape(_begin(name)) + ".*?" + re.escape(_end(name))
+            filled = _begin(name) + text + "\n" * bool(text) + _end(name)
+            self.text = re.sub(block, lambda _, filled=filled: filled, self.text, flags=re.S)
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        self.path.write_text(self.text, encoding="utf-8")
+        return str(self.path)
+
+
+def _begin(name):
+    return f"<!-- {name} -->\n"
+
+
+def _end(name):
+    return f"<!-- end of {name} -->"
+
+
+def docs_page(name, *blocks):
+    """A page of the docs; leaves with a message where there are none, before the work instead of after it."""
     if not DOCS.is_dir():
         sys.exit(f"{DOCS}: must be the docs of the program, got none; run this in a copy of the repository")
+    return Page(DOCS / f"{name}.md", name, blocks)
+
+
+def table(head, rows):
+    """Lines of a table; cells are shown by `str`."""
+    first, *others = ["| " + " | ".join(map(str, row)) + " |" for row in (head, *rows)]
+    return [first, "|" + "---|" * len(head), *others]
+
+
+def write_data(path, data):
+    """Write the numbers of a page as JSON; returns the path as text."""
+    Path(path).write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    return str(path)
+
+
+@contextmanager
+def picture(path, width, height):
+    """A figure of so many inches in the style of the docs, saved on leaving, in a folder that is made when absent."""
+    import matplotlib
+
+    from coupling.figures import RESOLUTION, STYLE, Picture
+
+    with matplotlib.rc_context(STYLE):
+        figure = Picture(figsize=(width, height), layout="constrained")
+        yield figure
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(path, dpi=RESOLUTION)
 
 
 def made_by(command, of_revision=None):
-    """Beginning of a page's first sentence: command, date, revision (of this code if left out) and machine."""
+    """First sentence of a page: command, date, revision (of this code if left out) and machine."""
     made = provenance()
-    return f"Made by `{command}` on {made['date']}, revision {of_revision or made['revision']}, {made['machine']}"
+    return f"Made by `{command}` on {made['date']}, revision {of_revision or made['revision']}, {made['machine']}."
 
 
 def provenance():

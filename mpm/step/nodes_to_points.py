@@ -82,6 +82,7 @@ def advance_kernel(needs):
         a, b, c = net.nodes[ia], net.nodes[ib], net.nodes[ic]
         at_a, at_b, at_c = momenta[ia], momenta[ib], momenta[ic]
         border = tied and max(ia, ib, ic) >= n_nodes
+        jx0 = jy0 = jx1 = jy1 = jx2 = jy2 = 0.0
         if border:
             jx0, jy0 = drift(ia, n_nodes, net.tied_means, a)
             jx1, jy1 = drift(ib, n_nodes, net.tied_means, b)

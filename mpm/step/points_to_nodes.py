@@ -9,14 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mpm.fields import POROSITY_CEILING, POROSITY_FLOOR
 from mpm.laws.law import stress_kernel
 from mpm.laws.stress import Strain, Stress
 from mpm.machine.compile import index, inline_kernel, kernel_part, prefetch
 from mpm.step.cells import felt_share, is_carried
 from mpm.step.nodes_to_points import AHEAD, on_element, shares
-
-POROSITY_FLOOR = 0.05
-POROSITY_CEILING = 0.90
 
 
 class Push(NamedTuple):

@@ -16,6 +16,7 @@ from coupling.scenes.mistakes import line_of
 from coupling.scenes.plausibility import warnings_of
 from verification.robustness import wild_scenes
 from verification.robustness.damaged_files import READERS, damaged, judged
+from verification.sensitivity.variants import value_at
 from verification.small_event import small_scene
 from verification.synthetic_run import write_run
 
@@ -38,7 +39,7 @@ def test_any_dotted_change_is_planned_with_its_value_or_refused(seed):
     changes, (name, expected) = wild_scenes.wild_changes(random.Random(seed))
     verdict, _ = wild_scenes.judged(lambda: coupling.load_scene("quick", **changes), "quick", False)
     if verdict != "refused":
-        found = wild_scenes.value_at(coupling.load_scene("quick", **changes), name)
+        found = value_at(coupling.load_scene("quick", **changes), name)
         assert found == pytest.approx(expected, rel=1e-12)
 
 

@@ -9,7 +9,7 @@ import coupling
 from coupling.datasets import RunFileError, read_response
 from coupling.runs import progress_line
 from coupling.runs.progress_line import ProgressLine
-from verification.stability import command as stability_command
+from verification.stability import report as stability_report
 
 
 @pytest.fixture
@@ -59,7 +59,7 @@ def test_linear_stability_tells_how_far_it_is(monkeypatch, impatient):
             clock.sleep(0.1)
         raise Stopped
 
-    monkeypatch.setattr(stability_command, "critical_map", slow)
+    monkeypatch.setattr(stability_report, "critical_map", slow)
     result = gush("stability", "--linear")
     assert isinstance(result.exception, Stopped)
     assert "linear analysis: 1 of 900" in result.stderr and "linear analysis: 3 of 900" in result.stderr

@@ -6,7 +6,7 @@ from coupling.postprocess import filled
 from mpm.fields import values
 from mpm.scene import Scene
 from mpm.solver import Solver
-from verification.problems import boxes
+from verification import boxes
 
 GRAIN_DENSITY, POROSITY, LOOSE = 2650.0, 0.45, 0.55
 

@@ -6,10 +6,9 @@ import pytest
 import coupling
 import mpm
 from mpm.fields import block, values
-from verification.problems.boxes import box_mesh
-from verification.problems.driven import box_scene
+from verification.boxes import box_mesh, box_scene
+from verification.monitor import kinetic_energy
 from verification.small_event import COARSE
-from verification.stability.monitor import kinetic_energy
 
 GRADED = {**COARSE, "size_growth": 0.3}
 
@@ -62,7 +61,7 @@ def test_every_level_steps_within_the_limit_of_its_elements(mesh):
 
 def test_elements_of_one_size_are_one_level():
     mesh = box_mesh(np.linspace(-2, 2, 9), np.linspace(-4, 0, 9))
-    solver = mpm.Solver(box_scene("column", 0.5, 4.0, 4.0, {"model": "elastic"}), mesh)
+    solver = mpm.Solver(box_scene("column", 0.5, 4.0, 4.0, model="elastic"), mesh)
     assert solver.levels.count == 1 and len(solver.nodes) == len(mesh.nodes)
 
 
@@ -118,7 +117,7 @@ def pulse_error(local, courant=0.8, coarse=0.4, fine=0.1):
     Norm: root mean square over that of the exact answer, d'Alembert: v(y, t) = (f(y - c t) + f(y + c t)) / 2 with
     images at the free surface (same sign) and at the fixed bottom (opposite sign).
     """
-    scene = box_scene("pulse", 0.4, 1.6, 24.0, {"model": "elastic"}, gravity=1e-9, courant=courant, pic_rate=0.0,
+    scene = box_scene("pulse", 0.4, 1.6, 24.0, gravity=1e-9, model="elastic", courant=courant, pic_rate=0.0,
                       stress_damping=0.0, local_time_stepping=local)  # fmt: skip
     solver = mpm.Solver(scene, graded_column(coarse, fine), threads=1)
     assert (solver.levels.count > 1) == local

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mpm.points import sort_by_element, update_order
+from mpm.step.sort import sort_by_element, update_order
 
 
 @pytest.mark.parametrize("removed", [0.0, 0.3])

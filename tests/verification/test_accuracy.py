@@ -8,11 +8,13 @@ import xarray as xr
 from running import gush
 
 import coupling
-from verification.accuracy.ladder_report import write_ladder
 from verification.accuracy.ladders import assess, dataset, measure
-from verification.accuracy.mesh_ladder import refined
 from verification.accuracy.orders import excess_over_front, extrapolate, observed_order, pareto_front
 from verification.problems.problem import Problem, Result
+from verification.sensitivity.inflow import error_bars, measured_table, spread
+from verification.sensitivity.mesh import scene_ladder, write_ladder
+from verification.sensitivity.variants import meshes
+from verification.small_event import COARSE
 
 
 def solve(cells=8, courant=0.5, friction_angle=30.0):
@@ -101,33 +103,41 @@ def test_command_writes_page_data_and_pictures(tmp_path, monkeypatch):
 
 def test_refined_scene_keeps_the_gate_in_whole_elements():
     scene = coupling.load_scene("case-3")
-    changes = refined(scene, 0.5**0.5)
-    finer = coupling.load_scene("case-3", discretisation=changes).discretisation
+    finer = coupling.load_scene("case-3", **meshes(scene, 0.5**0.5)).discretisation
     assert finer.elements_across_gate == 11 and finer.element_size == pytest.approx(0.75 * 0.5**0.5)
-    assert refined(scene, 4.0)["elements_across_gate"] == 2
+    assert meshes(scene, 4.0)["discretisation.elements_across_gate"] == 2
 
 
 def test_page_of_a_mesh_ladder_says_value_and_error_bar(tmp_path):
     factor = np.array([2.0, 1.0, 0.5])
-    values = np.stack([100 + 10 * factor, 50 - factor], axis=1)[:, None, :]
-    state = ("inflow_mass", "quantity")
-    ladder = xr.Dataset(
-        {
-            "value": (("mesh", *state), values),
-            "extrapolated": (state, [[100.0, 50.0]]),
-            "error_bar": (state, [[5.0, 0.5]]),
-            "scatter": (state, [[0.0, 0.0]]),
-        },
-        coords={
-            "factor": ("mesh", factor),
-            "inflow_mass": [500.0],
-            "quantity": ["M max", "N max"],
-            "unit": ("quantity", ["kN m/m", "kN/m"]),
-        },
-    )
-    runs = [{"factor": f, "points": 1, "steps": 1, "cpu_seconds": 1.0, "time": 1.0, "revision": "abc"} for f in factor]
-    written = write_ladder(ladder, "case-3", runs, tmp_path)
-    assert "| M max [kN m/m] | 110 | 100 | ±5 | 0 | +10 |" in (tmp_path / "case-3-ladder.md").read_text()
+    found = {500.0: {"M max [kN m/m]": 100 + 10 * factor, "N max [kN/m]": 50 - factor}}
+    written = write_ladder("case-3", factor, found, np.ones(3), tmp_path)
+    assert "| M max [kN m/m] | 110 | 100 | ±5 |" in (tmp_path / "case-3-ladder.md").read_text()
     assert (tmp_path / "images" / "case-3-ladder-500.png").stat().st_size > 5000
     with xr.open_dataset(written["data"], engine="h5netcdf") as stored:
-        assert stored["error_bar"].sel(quantity="M max").item() == 5.0
+        assert stored["error_bar"].sel(quantity="M max [kN m/m]").item() == pytest.approx(5.0)
+
+
+@pytest.mark.slow
+def test_mesh_ladder_of_a_scene_runs_its_meshes_once(tmp_path):
+    mesh = {f"{name} = {value}" for name, value in COARSE.items()}
+    file = tmp_path / "coarse.toml"
+    file.write_text('base = "quick"\nname = "coarse"\n[discretisation]\n' + "\n".join(sorted(mesh)) + "\n")
+    lines = []
+    for _ in range(2):
+        written = scene_ladder(str(file), 5.0, tmp_path / "out", lines.append, factors=(1.0, 0.9, 0.8))
+    assert sum(line.endswith("done") for line in lines) == 3
+    with xr.open_dataset(written["data"], engine="h5netcdf") as stored:
+        assert stored.sizes == {"mesh": 3, "inflow_mass": 5, "quantity": len(stored["quantity"])}
+        time = stored["value"].sel(quantity="time [s]")
+        assert (time.isel(inflow_mass=-1) > time.isel(inflow_mass=1)).all()
+        assert np.isfinite(stored["value"]).all()
+
+
+def test_error_bars_take_the_meshes_apart_from_all_other_choices():
+    variants = ["as the scene has it", *(f"all elements {k} times as large" for k in (2, 1.4, 0.7)), "courant 0.4",
+                "half the elements across the gate"]  # fmt: skip
+    found = {"M max [kN m/m]": np.array([110.0, 120.0, 114.0, 107.0, 113.0, 200.0])}
+    assert "| M max [kN m/m] | 110 | 100 | 7 | 3 |" in "\n".join(error_bars(variants, found))
+    assert "M max -2.7 .. +81.8 %" in spread(found)
+    assert "| courant 0.4 | 113 |" in "\n".join(measured_table(variants, found))

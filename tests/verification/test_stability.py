@@ -1,16 +1,21 @@
 """Linear stability of the step, and a dozen of the extremes of `gush stability`; all of them: docs/stability.md."""
 
+import json
 import math
+from dataclasses import asdict
 
 import numpy as np
 import pytest
 
 from mpm.solver import Solver
+from verification.monitor import Monitor, follow
+from verification.pages import Page
 from verification.stability.amplification import Amplification, Column
-from verification.stability.cases import cases
-from verification.stability.extremes import BUG, STABLE, Case, judge, judge_apart
+from verification.stability.cases import Case, cases
 from verification.stability.linear import critical_map
-from verification.stability.trials import box_of, box_scene
+from verification.stability.report import families, write
+from verification.stability.trials import block_scene, box_of
+from verification.stability.verdicts import BUG, STABLE, judge, judge_apart
 
 pytestmark = pytest.mark.slow
 
@@ -79,7 +84,7 @@ def test_map_is_a_dataset_with_units():
 def test_a_run_with_spectral_steps_takes_longer_ones_to_the_same_end():
     ends = {}
     for way in ("altitude", "spectral"):
-        scene = box_scene(0.1)
+        scene = block_scene(0.1)
         numerics = scene.numerics.model_copy(update={"critical_step": way})
         solver = Solver(scene.model_copy(update={"numerics": numerics}), box_of(0.1, 0, 12, 0, 8), threads=1)
         solver.points[:, 2] = 1e-3 * np.cos(np.pi * solver.points[:, 0] / 1.2)  # a long wave
@@ -98,15 +103,20 @@ def test_extreme_is_stable(name):
     assert verdict.verdict == STABLE, verdict.reason
 
 
-def test_a_dozen_extremes_are_representative():
-    assert len(REPRESENTATIVE) == 12
+def test_page_and_data_hold_the_map_and_the_extremes(tmp_path):
+    found = critical_map([("dry", Column(bulk_modulus=None)), ("wet", Column())])
+    verdict = judge(Case("still", "nothing happens", lambda: (["moves"], {})))
+    data = {"linear": families(found), "extremes": [asdict(verdict)]}
+    page = Page(tmp_path / "stability.md", "Stability", ("made", "map", "extremes"))
+    files = write(page, data, None)
+    text = (tmp_path / "stability.md").read_text()
+    assert "| still | nothing happens | bug |" in text and "1 bug" in text and "moves" in text
+    assert json.loads((tmp_path / "stability.json").read_text()) == data
+    assert files == sorted([str(tmp_path / "stability.md"), str(tmp_path / "stability.json")])
 
 
 def test_energy_from_nothing_is_found():
     # grains that are pushed on behind the back of the solver: a per cent of their velocity each step
-    from verification.stability.extremes import follow
-    from verification.stability.monitor import Monitor
-
     class Pushed(Solver):
         def step(self, dt_max=math.inf):
             done = super().step(dt_max)
@@ -115,7 +125,7 @@ def test_energy_from_nothing_is_found():
 
     faults = {}
     for kind in (Solver, Pushed):
-        solver = kind(box_scene(0.1, bulk_modulus=None), box_of(0.1, 0, 6, 0, 6), threads=1)
+        solver = kind(block_scene(0.1, bulk_modulus=None), box_of(0.1, 0, 6, 0, 6), threads=1)
         solver.points[:, 2] = 1e-3 * np.cos(np.pi * solver.points[:, 0] / 0.6)
         faults[kind], _ = follow(Monitor(solver), 0.1)
     assert not any("energy from nothing" in fault for fault in faults[Solver])

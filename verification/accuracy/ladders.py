@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import asdict
 
 from verification.accuracy.orders import excess_over_front, observed_order, pareto_front
-from verification.problems.problem import Problem
+from verification.problems.problem import Problem, Result
 
 #: Settings that count something: their mesh size or time step is one over the value.
 COUNTS = ("cells", "elements", "columns", "rows", "across", "steps", "increments", "points_per_element", "points")
@@ -49,28 +50,10 @@ def measure(problem: Problem, only_fast: bool = False, progress: Callable[[str],
 def _row(problem, setting, value, changes):
     row = {"problem": problem.name, "setting": setting, "value": value}
     try:
-        result = problem.solve(**(problem.fast | changes))
-    except (ArithmeticError, RuntimeError) as failure:
-        return row | _nothing(str(failure))
-    return row | {
-        "error": float(result.error),
-        "cpu_seconds": float(result.cpu_seconds),
-        "steps": int(result.steps),
-        "points": int(result.points),
-        "values": {name: float(number) for name, number in result.values.items()},
-        "failure": "",
-    }
-
-
-def _nothing(message):
-    return {
-        "error": math.nan,
-        "cpu_seconds": math.nan,
-        "steps": 0,
-        "points": 0,
-        "values": {},
-        "failure": message,
-    }
+        result, failure = problem.solve(**(problem.fast | changes)), ""
+    except (ArithmeticError, RuntimeError) as error:
+        result, failure = Result(math.nan, cpu_seconds=math.nan), str(error)
+    return row | asdict(result) | {"failure": failure}
 
 
 def _line(row):
@@ -91,21 +74,20 @@ def assess(rows: Iterable[dict]) -> dict:
     rows = list(rows)
     physical = physical_settings()
     known = [k for k, row in enumerate(rows) if math.isfinite(row["error"]) and row["setting"] not in physical]
+    costs, errors = ([rows[k][key] for k in known] for key in ("cpu_seconds", "error"))
     front = [False] * len(rows)
-    if known:
-        for k, best in zip(known, pareto_front(*_costs(rows, known)), strict=True):
-            front[k] = bool(best)
+    for k, best in zip(known, pareto_front(costs, errors), strict=True):
+        front[k] = bool(best)
     orders = {}
     for setting in dict.fromkeys(row["setting"] for row in rows if row["value"] is not None):
         if setting not in (*COUNTS, *SIZES):
             continue
         mine = [row for row in rows if row["setting"] == setting and row["error"] > ROUND_OFF]
-        numbers = [row["value"] for row in mine]
-        sizes = [(1 / n if setting in COUNTS else n) if n > 0 else math.nan for n in numbers]
+        sizes = [(1 / n if setting in COUNTS else n) if n > 0 else math.nan for n in (row["value"] for row in mine)]
         orders[setting] = observed_order(sizes, [row["error"] for row in mine])
     first = next((k for k, i in enumerate(known) if rows[i]["setting"] == "default"), None)
-    excess = math.nan if first is None else excess_over_front(*_costs(rows, known), first)
-    if first is not None and rows[known[first]]["error"] <= ROUND_OFF:
+    excess = math.nan if first is None else excess_over_front(costs, errors, first)
+    if first is not None and errors[first] <= ROUND_OFF:
         excess = 1.0
     return {"orders": orders, "front": front, "excess": excess}
 
@@ -115,10 +97,6 @@ def physical_settings() -> set[str]:
     from mpm.scene import Soil, Water
 
     return {*Soil.model_fields, *Water.model_fields, *POSED} - {"bulk_modulus"}
-
-
-def _costs(rows, known):
-    return [rows[k]["cpu_seconds"] for k in known], [rows[k]["error"] for k in known]
 
 
 def dataset(rows: Iterable[dict]):
@@ -133,26 +111,21 @@ def dataset(rows: Iterable[dict]):
     import xarray as xr
 
     rows = list(rows)
-    front = {}
+    front = []
     for name in dict.fromkeys(row["problem"] for row in rows):
-        mine = [k for k, row in enumerate(rows) if row["problem"] == name]
-        front |= dict(zip(mine, assess(rows[k] for k in mine)["front"], strict=True))
-
-    def column(key, units, long_name, convert=lambda value: value):
-        values = np.array([convert(row[key]) for row in rows])
-        return "run", values, {"units": units, "long_name": long_name}
-
-    return xr.Dataset(
-        {
-            "error": column("error", "1", "error in the norm of the problem"),
-            "cpu_seconds": column("cpu_seconds", "s", "processor time of stepping"),
-            "steps": column("steps", "1", "time steps"),
-            "points": column("points", "1", "material points"),
-            "on_front": ("run", np.array([front[k] for k in range(len(rows))], np.int8), {"units": "1"}),
-        },
-        coords={
-            "problem": column("problem", "1", "verification problem"),
-            "setting": column("setting", "1", "what was changed; 'default': nothing"),
-            "setting_value": column("value", "1", "its value", lambda value: "" if value is None else str(value)),
-        },
-    )
+        front += assess(row for row in rows if row["problem"] == name)["front"]
+    columns = {
+        "error": ("1", "error in the norm of the problem"), "cpu_seconds": ("s", "processor time of stepping"),
+        "steps": ("1", "time steps"), "points": ("1", "material points"), "problem": ("1", "verification problem"),
+        "setting": ("1", "what was changed; 'default': nothing"),
+    }  # fmt: skip
+    data = {
+        name: ("run", np.array([row[name] for row in rows]), {"units": units, "long_name": text})
+        for name, (units, text) in columns.items()
+    }
+    values = np.array(["" if row["value"] is None else str(row["value"]) for row in rows])
+    data |= {
+        "on_front": ("run", np.array(front, np.int8), {"units": "1"}),
+        "setting_value": ("run", values, {"units": "1", "long_name": "its value"}),
+    }
+    return xr.Dataset(data).set_coords(["problem", "setting", "setting_value"])

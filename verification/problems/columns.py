@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
-from mpm.fields import values
 from mpm.solver import Solver
-from verification.problems.boxes import box_mesh
-from verification.problems.driven import DrivenSolver, box_scene
-from verification.problems.problem import NUMERICS, WET, Problem, Result, Stopwatch, register
+from verification.boxes import STRESS, box_mesh, box_scene, inside, put, run_to, state
+from verification.driven import DrivenSolver
+from verification.loads import theory_pressures
+from verification.problems.problem import NUMERICS, WET, Problem, Result, register
 from verification.problems.two_phase import (
     NU,
     POROSITY,
@@ -17,59 +17,48 @@ from verification.problems.two_phase import (
     terzaghi_series,
 )
 
+DRAINAGE = ("two-phase", "undrained")
 
-def column(
-    cells, height, conductivity, bulk_modulus, youngs_modulus=4e7, model="elastic", drainage="two-phase", **numerics,
-):  # fmt: skip
+
+def column(cells, height, conductivity, bulk_modulus, **settings):
     """A wet column, two elements wide, drained at its top, and its scene: (scene, mesh).
 
-    `cells` elements over `height` [m]; the ground water stands at the top.
+    `cells` elements over `height` [m]; the ground water stands at the top; elastic, unless `settings` say otherwise.
     """
     size = height / cells
-    soil = {
-        "model": model, "youngs_modulus": youngs_modulus, "poissons_ratio": NU, "cohesion": 1e5, "porosity": POROSITY,
-        "loose_porosity": 0.6, "hydraulic_conductivity": conductivity,
+    ground = {
+        "model": "elastic", "youngs_modulus": 4e7, "poissons_ratio": NU, "cohesion": 1e5, "porosity": POROSITY,
+        "loose_porosity": 0.6, "hydraulic_conductivity": conductivity, "bulk_modulus": bulk_modulus,
     }  # fmt: skip
-    water = {"bulk_modulus": bulk_modulus, "drainage": drainage}
-    scene = box_scene("column", size, 2 * size, height, soil, water, **numerics)
+    scene = box_scene("column", size, 2 * size, height, **ground | settings)
     return scene, box_mesh(np.array([-size, 0.0, size]), (np.arange(cells + 2) - cells) * size)
 
 
-def terzaghi(
-    cells=20, conductivity=1e-4, bulk_modulus=8e7, time_factor=0.1, inertia=False, drainage="two-phase",
-    **numerics,
-):  # fmt: skip
+def terzaghi(cells=20, conductivity=1e-4, bulk_modulus=8e7, time_factor=0.1, inertia=False, **numerics):
     """Let an excess pressure, carried by the water of a column of 1 m, drain through its top until Tv = `time_factor`.
 
     Reference: Terzaghi (1923), series; c_v = k / (rho g (1/M + n/K_w)). Where the time factor can not be reached,
     since the column stays undrained, ask for the small one that is: the exact answer is the initial state then. With
     `inertia` against the answer of grains and water that have mass.
     """
-    height, initial = 1.0, 1e4
-    scene, mesh = column(cells, height, conductivity, bulk_modulus, drainage=drainage, **numerics)
+    height, initial, longest = 1.0, 1e4, [0.0]
+    scene, mesh = column(cells, height, conductivity, bulk_modulus, **numerics)
     solver = Solver(scene, mesh, threads=1)
-    hydrostatic = solver.points["pore_pressure"].copy()
-    solver.points["pore_pressure"] += initial
-    solver.points["stress_yy"] += initial  # total stress unchanged: the load is carried by the water
-    solver.points["stress_xx"] += NU / (1 - NU) * initial
-    solver.points["stress_zz"] += NU / (1 - NU) * initial
+    hydrostatic = state(solver, "pore_pressure")
+    # total stress unchanged: the load is carried by the water
+    for name, share in (("stress_yy", 1.0), ("stress_xx", NU / (1 - NU)), ("stress_zz", NU / (1 - NU))):
+        put(solver, **{name: state(solver, name) + share * initial})
+    put(solver, pore_pressure=hydrostatic + initial)
     storage = 1 / constrained_modulus() + POROSITY / bulk_modulus
     end = time_factor * height**2 * 1000 * 9.81 * storage / conductivity
-    longest = 0.0
-    with Stopwatch() as watch:
-        while solver.time < end * (1 - 1e-12):
-            longest = max(longest, solver.step(end - solver.time)[0])
-    depth = -solver.points["y"]
+    seconds = run_to(solver, end, after=lambda dt: longest.append(max(longest.pop(), dt)))
+    depth = -state(solver, "y")
     series = terzaghi_series(depth, time_factor)
     exact = consolidation_with_inertia(depth, end, bulk_modulus, conductivity) if inertia else series
-    miss = (solver.points["pore_pressure"] - hydrostatic) / initial - exact
-    return Result(
-        error=math.sqrt(np.mean(miss**2)),
-        values={
-            "time_step": longest, "time": end, "largest": float(np.abs(miss).max()),
-            "inertia": float(np.sqrt(np.mean((exact - series) ** 2))),
-        },
-        steps=solver.step_count, points=solver.n_points, cpu_seconds=watch.seconds,
+    miss = (state(solver, "pore_pressure") - hydrostatic) / initial - exact
+    return Result.of(
+        solver, seconds, np.sqrt(np.mean(miss**2)), time_step=longest[0], time=end, largest=np.abs(miss).max(),
+        inertia=np.sqrt(np.mean((exact - series) ** 2)),
     )  # fmt: skip
 
 
@@ -80,30 +69,35 @@ def oedometer(cells=5, strain=1e-3, duration=0.5, **numerics):
     strain e, since the rates add up on the deformed column.
     """
     size = 1.0 / cells
-    soil = {"model": "elastic", "poissons_ratio": NU}
-    scene = box_scene("oedometer", size, 2 * size, 1.0, soil, gravity=1e-9, **numerics)
+    scene = box_scene("oedometer", size, 2 * size, 1.0, 1e-9, model="elastic", poissons_ratio=NU, **numerics)
     solver = DrivenSolver(scene, box_mesh([-size, 0.0, size], np.linspace(-1, 0, cells + 1)), damping=0.5)
-    solver.points[["stress_xx", "stress_yy", "stress_zz"]] = 0.0
+    put(solver, stress_xx=0.0, stress_yy=0.0, stress_zz=0.0)
     top = solver.mesh.top
     solver.driven[top, 1] = True
-    with Stopwatch() as watch:
-        while solver.time < duration * (1 - 1e-12):
-            # a velocity that rises and falls as sin^2 leaves no wave behind
-            solver.velocity[top, 1] = -2 * strain / duration * math.sin(math.pi * solver.time / duration) ** 2
-            solver.step(min(duration - solver.time, duration / 200))
+
+    def press():
+        # a velocity that rises and falls as sin^2 leaves no wave behind
+        solver.velocity[top, 1] = -2 * strain / duration * math.sin(math.pi * solver.time / duration) ** 2
+
+    seconds = run_to(solver, duration, press, longest=duration / 200)
     vertical = constrained_modulus(scene.soils[0].youngs_modulus) * math.log1p(-strain)
-    stress = values(solver.points, ("stress_xx", "stress_yy", "stress_zz")) / vertical
+    stress = state(solver, *STRESS[:3]) / vertical
     miss = stress - [NU / (1 - NU), 1.0, NU / (1 - NU)]
-    return Result(
-        error=float(np.sqrt(np.mean(miss**2))),
-        values={"vertical": float(stress[:, 1].mean()), "lateral": float(stress[:, 0].mean())},
-        steps=solver.step_count, points=solver.n_points, cpu_seconds=watch.seconds,
-    )  # fmt: skip
+    return Result.of(
+        solver, seconds, np.sqrt(np.mean(miss**2)), vertical=stress[:, 1].mean(), lateral=stress[:, 0].mean()
+    )
 
 
-def hydrostatics(
-    size=0.35, size_growth=0.3, duration=0.05, points=3, lining="fixed", **numerics,
-):  # fmt: skip
+def _rough_tunnel(lining):
+    rough = {"x": 0.0, "cover": 20.0, "outer_diameter": 6.6, "inner_diameter": 5.9, "friction_coefficient": 2.0}
+    if lining == "fixed":
+        return rough
+    ring = 1.0 - (rough["inner_diameter"] / rough["outer_diameter"]) ** 2
+    ground = (1 - POROSITY) * 2650.0 + POROSITY * 1000.0
+    return rough | {"lining_density": ground / ring, "lining_modulus": 1e13, "lining_poissons_ratio": 0.2}
+
+
+def hydrostatics(size=0.35, size_growth=0.3, duration=0.05, points=3, lining="fixed", **numerics):
     """Ground under K0 and hydrostatic stress around a lining without a gate, left to itself for `duration` [s].
 
     Reference: at angle a from the crown soil presses with sigma_v (cos^2 a + K0 sin^2 a), water with rho g z, and
@@ -114,63 +108,37 @@ def hydrostatics(
     import coupling
     from mpm.meshing import build_mesh
 
-    rough = {"x": 0.0, "cover": 20.0, "outer_diameter": 6.6, "inner_diameter": 5.9, "friction_coefficient": 2.0}
-    if lining != "fixed":
-        ring = 1.0 - (rough["inner_diameter"] / rough["outer_diameter"]) ** 2
-        ground = (1 - POROSITY) * 2650.0 + POROSITY * 1000.0
-        rough |= {"lining_density": ground / ring, "lining_modulus": 1e13, "lining_poissons_ratio": 0.2}
     scene = coupling.load_scene(
-        "quick", gate="none", tunnels=[rough], lining=lining, stop={"time": duration}, output={"interval": duration},
+        "quick", gate="none", tunnels=[_rough_tunnel(lining)], lining=lining, stop={"time": duration},
+        output={"interval": duration}, numerics=numerics,
         discretisation={
             "element_size": 3.0, "element_size_lining": size, "size_growth": size_growth, "points_per_element": points,
         },
-        numerics=numerics,
     )  # fmt: skip
     solver = Solver(scene, build_mesh(scene), threads=1)
     solver.relax()
-    before = solver.points.copy()
-    with Stopwatch() as watch:
-        while solver.time < duration * (1 - 1e-12):
-            solver.impulse[:] = 0.0
-            begin = solver.time
-            solver.step(duration - solver.time)
-    (lining,) = solver.lining_pressures(solver.time - begin)
-    tunnel, soil, water = scene.tunnels[0], scene.soils[0], scene.water
-    angle = np.radians(lining["theta"])
-    depth = tunnel.axis_depth - tunnel.outer_radius * np.cos(angle)
-    buoyant = (1 - soil.porosity) * (soil.grain_density - water.density) * scene.gravity
-    k0 = soil.lateral_pressure_coefficient(buoyant * depth)
-    exact = {
-        "soil_pressure": buoyant * depth * (np.cos(angle) ** 2 + k0 * np.sin(angle) ** 2),
-        "water_pressure": water.density * scene.gravity * depth,
-    }
-    misses = {name: float(np.abs(lining[name] / value - 1).max()) for name, value in exact.items()}
-    inside = solver.element_of_point >= 0
-    order = (
-        np.lexsort(values(solver.points, ("x_initial", "y_initial")).T),
-        np.lexsort(values(before, ("x_initial", "y_initial")).T),
-    )
-    change = np.abs(
-        values(solver.points[order[0]], ("stress_xx", "stress_yy", "stress_zz", "pore_pressure"))
-        - values(before[order[1]], ("stress_xx", "stress_yy", "stress_zz", "pore_pressure"))
-    ).max()
-    speed = np.abs(
-        values(
-            solver.points[inside], ("velocity_solid_x", "velocity_solid_y", "velocity_liquid_x", "velocity_liquid_y")
-        )
-    ).max()
-    return Result(
-        error=max(misses.values()),
-        values={
-            **misses, "largest_velocity": float(speed),
-            "change_of_stress": float(change / np.abs(before["stress_yy"]).max()),
-            "grains": float(solver.points["grain_mass"].sum() / solver.initial_grain_mass - 1),
-        },
-        steps=solver.step_count, points=solver.n_points, cpu_seconds=watch.seconds,
+    carried = (*STRESS[:3], "pore_pressure")
+    before, places, begin = state(solver, *carried), state(solver, "x_initial", "y_initial"), [0.0]
+
+    def forget():
+        solver.impulse[:] = 0.0
+        begin[0] = solver.time
+
+    seconds = run_to(solver, duration, forget)
+    (lining,) = solver.lining_pressures(solver.time - begin[0])
+    theory = theory_pressures(scene, theta=lining["theta"]).isel(time=0)
+    names = ("soil_pressure", "water_pressure")
+    misses = {name: float(np.abs(lining[name] / theory[name].values - 1).max()) for name in names}
+    # points are sorted on the way
+    now, then = np.lexsort(state(solver, "x_initial", "y_initial").T), np.lexsort(places.T)
+    change = np.abs(state(solver, *carried)[now] - before[then]).max()
+    velocities = state(solver, "velocity_solid_x", "velocity_solid_y", "velocity_liquid_x", "velocity_liquid_y")
+    return Result.of(
+        solver, seconds, max(misses.values()), **misses, largest_velocity=np.abs(velocities[inside(solver)]).max(),
+        change_of_stress=change / np.abs(before[:, 1]).max(),
+        grains=state(solver, "grain_mass").sum() / solver.initial_grain_mass - 1,
     )  # fmt: skip
 
-
-DRAINAGE = ("two-phase", "undrained")
 
 register(Problem(
     name="hydrostatics", title="K0 and hydrostatic stress around a closed lining stay as they are",

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import importlib
-import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 #: Modules of this package that register problems when they are imported.
-FAMILIES = ("columns", "waves", "motion", "conservation", "plasticity", "flows", "earth_pressure", "openings", "slots")
+FAMILIES = (
+    "columns", "waves", "motion", "conservation", "plasticity", "flows", "earth_pressure", "cavities", "slots",
+)  # fmt: skip
 
 #: Numerical choices that a problem hands through to its scene, and the values that its ladder goes through.
 NUMERICS = {
@@ -35,6 +36,12 @@ class Result:
     steps: int = 0
     points: int = 0
     cpu_seconds: float = 0.0
+
+    @classmethod
+    def of(cls, solver, seconds, error, **values):
+        """Of a run of a solver that took so many processor seconds."""
+        values = {name: float(value) for name, value in values.items()}
+        return cls(float(error), values, int(solver.step_count), int(solver.n_points), seconds)
 
 
 @dataclass(frozen=True)
@@ -87,14 +94,3 @@ def problems() -> dict[str, Problem]:
     for family in FAMILIES:
         importlib.import_module(f"verification.problems.{family}")
     return dict(_REGISTRY)
-
-
-class Stopwatch:
-    """Processor time of a `with` block in `seconds`."""
-
-    def __enter__(self):
-        self._begin = clock.process_time()
-        return self
-
-    def __exit__(self, *exception):
-        self.seconds = clock.process_time() - self._begin

@@ -5,60 +5,49 @@ import math
 import numpy as np
 
 from mpm.solver import Solver
-from verification.problems.boxes import box_mesh
+from verification.boxes import STRESS, box_mesh, box_scene, put, run_to, state
+from verification.monitor import kinetic_energy, strain_energy
 from verification.problems.columns import DRAINAGE, column
-from verification.problems.driven import box_scene
-from verification.problems.problem import NUMERICS, WET, Problem, Result, Stopwatch, register
-from verification.problems.two_phase import YOUNG, exact_velocities, modes
-from verification.stability.monitor import kinetic_energy, strain_energy
+from verification.problems.problem import NUMERICS, WET, Problem, Result, register
+from verification.problems.two_phase import exact_velocities, modes
 
 HEIGHT = 10.0  # [m]
 
 
-def two_phase_wave(
-    cells=20, conductivity=1.0, bulk_modulus=8e7, mode="fast", periods=2.0, drainage="two-phase",
-    **numerics,
-):  # fmt: skip
+def two_phase_wave(cells=20, conductivity=1.0, bulk_modulus=8e7, mode="fast", periods=2.0, **numerics):
     """Quarter of a standing wave in a column of 10 m, fixed at the bottom, free at the top, under its own weight.
 
     mode : "fast", "slow" or "together" (grains and water start with one velocity); periods : of the undamped wave, with
     "together" of the fast one. The amplitude is so small that no pressure becomes negative near the free surface.
     """
-    scene, mesh = column(cells, HEIGHT, conductivity, bulk_modulus, YOUNG, drainage=drainage, **numerics)
+    scene, mesh = column(cells, HEIGHT, conductivity, bulk_modulus, **numerics)
     solver = Solver(scene, mesh, threads=1)
     kappa = math.pi / (2 * HEIGHT)
-    strain = np.cos(kappa * (solver.points["y"] + HEIGHT))
+    strain = np.cos(kappa * (state(solver, "y") + HEIGHT))
     # water is as stiff as K_w + p: the mean of p where the wave strains it
-    bulk_modulus += float((strain**2 @ solver.points["pore_pressure"]) / (strain @ strain))
+    bulk_modulus += float((strain**2 @ state(solver, "pore_pressure")) / (strain @ strain))
     speeds, shapes = modes(bulk_modulus)
     shape = np.ones(2) if mode == "together" else shapes[1 if mode == "fast" else 0]
     amplitude = 1e-5 * shape / np.abs(shape).max()
-    wave = np.sin(kappa * (solver.points["y"] + HEIGHT))
-    solver.points["velocity_solid_y"], solver.points["velocity_liquid_y"] = amplitude[0] * wave, amplitude[1] * wave
-    end = periods * 2 * math.pi / kappa / speeds[0 if mode == "slow" else 1]
+    wave = np.sin(kappa * (state(solver, "y") + HEIGHT))
+    put(solver, velocity_solid_y=amplitude[0] * wave, velocity_liquid_y=amplitude[1] * wave)
     times, measured = [], []
-    with Stopwatch() as watch:
-        while solver.time < end * (1 - 1e-12):
-            dt, _ = solver.step(end - solver.time)
-            wave = np.sin(kappa * (solver.points["y"] + HEIGHT))
-            times.append(solver.time - 0.5 * dt)  # velocities belong to the middle of a step
-            measured.append(
-                [
-                    wave @ solver.points["velocity_solid_y"] / (wave @ wave),
-                    wave @ solver.points["velocity_liquid_y"] / (wave @ wave),
-                ]
-            )
+
+    def look(dt):
+        wave = np.sin(kappa * (state(solver, "y") + HEIGHT))
+        times.append(solver.time - 0.5 * dt)  # velocities belong to the middle of a step
+        measured.append(wave @ state(solver, "velocity_solid_y", "velocity_liquid_y") / (wave @ wave))
+
+    end = periods * 2 * math.pi / kappa / speeds[0 if mode == "slow" else 1]
+    seconds = run_to(solver, end, after=look)
     exact = exact_velocities(amplitude, kappa, times, bulk_modulus, conductivity)
     miss = (np.array(measured) - exact) / np.abs(amplitude).max()
-    values = {"largest": float(np.abs(miss).max()), "wave_speed_error": math.nan}
     crossings = [zero_crossings(times, np.asarray(a)[:, 0]) for a in (measured, exact)]
+    late = math.nan
     if min(len(c) for c in crossings) >= 3:
         spans = [c[2] - c[0] for c in crossings]
-        values["wave_speed_error"] = spans[1] / spans[0] - 1
-    return Result(
-        error=float(np.sqrt(np.mean(miss**2))), values=values, steps=solver.step_count, points=solver.n_points,
-        cpu_seconds=watch.seconds,
-    )  # fmt: skip
+        late = spans[1] / spans[0] - 1
+    return Result.of(solver, seconds, np.sqrt(np.mean(miss**2)), largest=np.abs(miss).max(), wave_speed_error=late)
 
 
 def zero_crossings(times, values):
@@ -75,39 +64,35 @@ def bar(cells=20, periods=5.0, **numerics):
     v'' + omega^2 tau v' + omega^2 v = 0. Without it the sum of kinetic and strain energy is constant.
     """
     size, length = 1.0 / cells, 1.0
-    soil = {"model": "elastic", "poissons_ratio": 0.0}
-    scene = box_scene("bar", size, 2 * size, length, soil, gravity=1e-9, **numerics)
+    scene = box_scene("bar", size, 2 * size, length, 1e-9, model="elastic", poissons_ratio=0.0, **numerics)
     solver = Solver(scene, box_mesh([-size, 0.0, size], np.linspace(-1, 0, cells + 1)), threads=1)
-    solver.points[["stress_xx", "stress_yy", "stress_zz", "pore_pressure"]] = 0.0
+    put(solver, **dict.fromkeys((*STRESS[:3], "pore_pressure"), 0.0))
     soil = scene.soils[0]
     speed = math.sqrt(soil.youngs_modulus / ((1 - soil.porosity) * soil.grain_density))
     omega, amplitude = math.pi * speed / (2 * length), 1e-4 * speed
-    shape = np.sin(math.pi / 2 * (solver.points["y"] + length))
-    solver.points["velocity_solid_y"] = amplitude * shape
-    begin = kinetic_energy(solver) + strain_energy(solver)
-    end, times, swing, energy = periods * 2 * math.pi / omega, [], [], []
-    with Stopwatch() as watch:
-        while solver.time < end * (1 - 1e-12):
-            before = strain_energy(solver)
-            dt, _ = solver.step(end - solver.time)
-            shape = np.sin(math.pi / 2 * (solver.points["y"] + length))
-            times.append(solver.time - 0.5 * dt)
-            swing.append(shape @ solver.points["velocity_solid_y"] / (shape @ shape) / amplitude)
-            energy.append((kinetic_energy(solver) + 0.5 * (before + strain_energy(solver))) / begin - 1)
+    put(solver, velocity_solid_y=amplitude * np.sin(math.pi / 2 * (state(solver, "y") + length)))
+    stored = [strain_energy(solver)]
+    begin = kinetic_energy(solver) + stored[0]
+    times, swing, energy = [], [], []
+
+    def look(dt):
+        shape = np.sin(math.pi / 2 * (state(solver, "y") + length))
+        times.append(solver.time - 0.5 * dt)
+        swing.append(shape @ state(solver, "velocity_solid_y") / (shape @ shape) / amplitude)
+        before, stored[0] = stored[0], strain_energy(solver)
+        energy.append((kinetic_energy(solver) + 0.5 * (before + stored[0])) / begin - 1)
+
+    end = periods * 2 * math.pi / omega
+    seconds = run_to(solver, end, after=look)
     times = np.array(times)
     decay = 0.5 * omega**2 * scene.numerics.stress_damping * end / solver.step_count
     turn = math.sqrt(omega**2 - decay**2)
     exact = np.exp(-decay * times) * (np.cos(turn * times) - decay / turn * np.sin(turn * times))
-    miss = np.array(swing) - exact
     crossings = zero_crossings(times, swing)
-    exact = (np.arange(len(crossings)) + 0.5) * math.pi / omega
-    return Result(
-        error=float(np.sqrt(np.mean(miss**2))),
-        values={
-            "energy": float(np.abs(energy).max()), "energy_at_the_end": float(np.mean(energy[-20:])),
-            "wave_speed_error": float(exact[-1] / crossings[-1] - 1), "decay": decay * end,
-        },
-        steps=solver.step_count, points=solver.n_points, cpu_seconds=watch.seconds,
+    last = (len(crossings) - 0.5) * math.pi / omega
+    return Result.of(
+        solver, seconds, np.sqrt(np.mean((np.array(swing) - exact) ** 2)), energy=np.abs(energy).max(),
+        energy_at_the_end=np.mean(energy[-20:]), wave_speed_error=last / crossings[-1] - 1, decay=decay * end,
     )  # fmt: skip
 
 

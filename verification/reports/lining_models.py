@@ -3,141 +3,90 @@
 uv run python -m verification.reports.lining_models    # under a minute; writes into docs/lining-models.md
 """
 
-import re
 import time as clock
 from functools import cache
 from types import SimpleNamespace
 
-import matplotlib
 import numpy as np
-import xarray as xr
 from matplotlib.collections import PolyCollection
-from matplotlib.figure import Figure
 
-from coupling.figures import RESOLUTION, STYLE
 from coupling.figures.comparison import forces_compared, joints_compared
 from coupling.responses.comparison import compare
 from coupling.scenes.scene import load_scene
 from structure import BeamSpringLining, ContinuumLining, LiningFailure
 from structure.response import FORCES
-from structure.theory import curved_section_moment, theoretical_pressures
-from verification.pages import DOCS, made_by, need_docs
+from structure.theory import curved_section_moment
+from verification.loads import GATE, falling_pressures
+from verification.pages import DOCS, docs_page, made_by, picture, table
 
 IMAGES = DOCS / "images"
-GATE = (90.0, 0.2)
-
-
-def pressures(scene, n_times):
-    """Theory pressures of a scene; around the gate they fall to a tenth, gaussian 15 degrees wide."""
-    tunnel, soil = scene.tunnels[0], scene.soils[0]
-    buoyant = (1 - soil.porosity) * (soil.grain_density - scene.water.density) * scene.gravity
-    base = theoretical_pressures(
-        outer_diameter=tunnel.outer_diameter,
-        cover=tunnel.cover,
-        buoyant_unit_weight=buoyant,
-        coefficient_at_rest=soil.lateral_pressure_coefficient(buoyant * tunnel.axis_depth),
-        water_unit_weight=scene.water.density * scene.gravity,
-    )
-    share = xr.DataArray(np.linspace(0, 0.9, n_times), dims="time")
-    fall = share * np.exp(-(((base["theta"] - GATE[0]) / 15) ** 2))
-    loads = base.isel(time=0, drop=True).map(lambda part: (part * (1 - fall)).transpose("time", "theta"))
-    loads = loads.assign_coords(time=("time", np.arange(n_times, dtype=float), {"units": "s"}))
-    loads["inflow_mass"] = ("time", np.linspace(0, 1000, n_times), {"units": "kg/m"})
-    return loads
-
-
-def write(name, lines):
-    """Replace the block of that name in the document, between its two comments."""
-    document = DOCS / "lining-models.md"
-    text = document.read_text(encoding="utf-8")
-    begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
-    if begin not in text:
-        raise ValueError(f"{document}: block {name!r} must be marked by '{begin.strip()}', got none")
-    body = "\n".join(lines) + "\n"
-    text = re.sub(re.escape(begin) + ".*?" + re.escape(end), lambda _: begin + body + end, text, flags=re.S)
-    document.write_text(text, encoding="utf-8")
-    print(body)
+WIDTH = 0.2  # of the gate [m]
+MOVED = (*FORCES, "displacement_radial", "joint_rotation")
 
 
 def cost(scene):
     """CPU seconds of both models for 1000 times, construction included."""
-    loads = pressures(scene, 1000)
-    lines = ["| model | CPU time for 1000 times [s] |", "|---|---|"]
+    loads, rows = falling_pressures(scene, 1000), []
     for name, model in {"beam-spring": BeamSpringLining, "continuum": ContinuumLining}.items():
         begin = clock.process_time()
         model(scene.ring).respond(loads)
-        lines.append(f"| {name} | {clock.process_time() - begin:.2f} |")
-    write("cost", lines)
+        rows.append((name, f"{clock.process_time() - begin:.2f}"))
+    return table(("model", "CPU time for 1000 times [s]"), rows)
 
 
 def difference_table(scene):
     """The table of `gush compare`, and its pictures."""
-    source = SimpleNamespace(ring=scene.ring, pressures=pressures(scene, 100), file="synthetic")
-    comparison = compare(source)
-    lines = ["| quantity | largest difference | of the extreme | where | when | known cause |", "|---" * 6 + "|"]
+    source = SimpleNamespace(ring=scene.ring, pressures=falling_pressures(scene, 100), file="synthetic")
+    comparison, rows = compare(source), []
     for row in comparison.rows:
         where = f"joint {row['joint']}" if row["theta"] is None else f"{row['theta']:g}°"
-        lines.append(
-            f"| {row['label']} | {row['difference'] * row['scale']:+.3g} {row['unit']} | {100 * row['relative']:.2f} %"
-            f" | {where} | {row['inflow_mass']:.0f} kg/m | {row['cause'] or '-'} |"
-        )
-    write("differences", lines)
+        size, share = f"{row['difference'] * row['scale']:+.3g} {row['unit']}", f"{100 * row['relative']:.2f} %"
+        rows.append((row["label"], size, share, where, f"{row['inflow_mass']:.0f} kg/m", row["cause"] or "-"))
     forces_compared(comparison.responses).savefig(IMAGES / "lining_models_forces.png", dpi=110)
     joints_compared(comparison.responses).savefig(IMAGES / "lining_models_joints.png", dpi=110)
+    return table(("quantity", "largest difference", "of the extreme", "where", "when", "known cause"), rows)
+
+
+def changes(one, other):
+    """Largest change of forces, displacement and rotation, in per cent of the extreme, as texts."""
+    moved = ((np.abs(other[name] - one[name]).max() / np.abs(one[name]).max()).item() for name in MOVED)
+    return [f"{100 * share:.1f} %" for share in moved]
 
 
 def open_gate(scene):
     """What neglecting the gate costs, for holes of some shares of the tunnel's length."""
-    loads = pressures(scene, 2)
+    loads, rows = falling_pressures(scene, 2), []
     whole = ContinuumLining(scene.ring).respond(loads)
-    lines = ["| cut | pressures | N | Q | M | radial displacement | joint rotation |", "|---" * 7 + "|"]
     for cut in (0.05, 1 / 6, 0.5, 0.9, 1.0):
         try:
-            hole = ContinuumLining(scene.ring, gate=(*GATE, cut)).respond(loads)
+            hole = ContinuumLining(scene.ring, gate=(GATE, WIDTH, cut)).respond(loads)
         except LiningFailure as failure:
-            lines.append(f"| {cut:.2f} | initial | {failure} | | | | |")
+            rows.append((f"{cut:.2f}", "initial", failure, "", "", "", ""))
             continue
-        for time, state in ((0, "initial"), (1, "final")):
-            cells = []
-            for name in (*FORCES, "displacement_radial", "joint_rotation"):
-                one, other = whole[name].isel(time=time), hole[name].isel(time=time)
-                cells.append(f"{100 * float(np.abs(other - one).max() / np.abs(one).max()):.1f} %")
-            lines.append(f"| {cut:.2f} | {state} | " + " | ".join(cells) + " |")
-    write("open gate", lines)
+        for time, when in ((0, "initial"), (1, "final")):
+            rows.append((f"{cut:.2f}", when, *changes(whole.isel(time=time), hole.isel(time=time))))
+    return table(("cut", "pressures", "N", "Q", "M", "radial displacement", "joint rotation"), rows)
 
 
 def joint_details(scene):
     """What grooves and bolts change of the plain ring, and the largest hoop stress near joint 2."""
-    loads = pressures(scene, 2).isel(time=[1])
-    cases = {
-        "plain": {},
-        "groove 50/40/20 mm": dict(groove=(0.05, 0.04, 0.02)),
-        "bolts 200 MN/m per m": dict(bolts=(-0.05, 0.4, 2e8)),
-        "both": dict(groove=(0.05, 0.04, 0.02), bolts=(-0.05, 0.4, 2e8)),
-    }
-    lines = [
-        "| joints | N | Q | M | radial displacement | joint rotation | compression near joint 2 [MPa] |",
-        "|---" * 7 + "|",
-    ]
-    plain = None
+    loads, rows, plain = falling_pressures(scene, 2).isel(time=[1]), [], None
+    groove, bolts = {"groove": (0.05, 0.04, 0.02)}, {"bolts": (-0.05, 0.4, 2e8)}
+    cases = {"plain": {}, "groove 50/40/20 mm": groove, "bolts 200 MN/m per m": bolts, "both": groove | bolts}
     for label, options in cases.items():
         model = ContinuumLining(scene.ring, layers=8, **options)
         response, stress = model.respond(loads).isel(time=0), model.stress_field(loads).isel(time=0)
-        plain = response if plain is None else plain
-        cells = []
-        for name in (*FORCES, "displacement_radial", "joint_rotation"):
-            change = float(np.abs(response[name] - plain[name]).max() / np.abs(plain[name]).max())
-            cells.append("-" if response is plain else f"{100 * change:.1f} %")
         near = np.abs(stress["theta"] - scene.ring.joint_angles[1]) < 0.4
-        cells.append(f"{-float(stress['stress_tt'].where(near).min()) / 1e6:.1f}")
-        lines.append(f"| {label} | " + " | ".join(cells) + " |")
-    write("details", lines)
+        pressed = f"{-float(stress['stress_tt'].where(near).min()) / 1e6:.1f}"
+        rows.append((label, *(["-"] * 5 if plain is None else changes(plain, response)), pressed))
+        plain = response if plain is None else plain
+    head = ("N", "Q", "M", "radial displacement", "joint rotation", "compression near joint 2 [MPa]")
+    return table(("joints", *head), rows)
 
 
 def error_over_time(scene):
     """Error of M and of the radial displacement against CPU seconds for 50 times, over element counts."""
-    loads = pressures(scene, 50)
-    names = ("bending_moment", "displacement_radial")
+    loads = falling_pressures(scene, 50)
 
     @cache
     def reference(n_angles):
@@ -152,21 +101,16 @@ def error_over_time(scene):
         model = build()
         response = model.respond(loads)
         seconds = clock.process_time() - begin
-        ring = model.ring
-        ends = response.isel(time=[0, -1]).copy()
+        ring, ends = model.ring, response.isel(time=[0, -1]).copy()
         if corrected:
             ends["bending_moment"] = ends["bending_moment"] + curved_section_moment(
-                ends["axial_force"],
-                ring.thickness,
-                ring.centre_radius,
-                ring.bending_stiffness,
-                len(ring.joint_angles),
-                ring.joint_rotational_stiffness,
-            )
+                ends["axial_force"], ring.thickness, ring.centre_radius, ring.bending_stiffness,
+                len(ring.joint_angles), ring.joint_rotational_stiffness,
+            )  # fmt: skip
         truth = reference(ring.n_elements)
         errors = [
             float(np.nanmax(np.abs(ends[name].values - truth[name].values)) / np.abs(truth[name]).max())
-            for name in names
+            for name in ("bending_moment", "displacement_radial")
         ]
         curves.setdefault(label, []).append((seconds, *errors, count))
 
@@ -174,30 +118,22 @@ def error_over_time(scene):
     BeamSpringLining(scene.ring).respond(loads)
     for count in (45, 90, 180, 360, 720, 1440):
         ring = scene.ring.model_copy(update={"n_elements": count})
-        measure("beam-spring", lambda ring=ring: BeamSpringLining(ring), count)
-        measure("beam-spring + curved section", lambda ring=ring: BeamSpringLining(ring), count, corrected=True)
-    for layers in (1, 2, 4):
-        for count in (45, 90, 180, 360, 720):
-            if layers == 4 and count > 360:
-                continue
-            measure(
-                f"continuum, {layers} layer{'s' * (layers > 1)}",
-                lambda count=count, layers=layers: ContinuumLining(scene.ring, columns=count, layers=layers),
-                count,
-            )
-    lines = [
-        "| model | elements around | CPU time for 50 times [s] | error of M | error of displacement |",
-        "|---" * 5 + "|",
-    ]
-    for label, rows in curves.items():
-        lines += [f"| {label} | {count} | {s:.2f} | {moment:.1e} | {w:.1e} |" for s, moment, w, count in rows]
-    write("errors", lines)
+        for label, corrected in (("beam-spring", False), ("beam-spring + curved section", True)):
+            measure(label, lambda ring=ring: BeamSpringLining(ring), count, corrected)
+    for layers, counts in ((1, (45, 90, 180, 360, 720)), (2, (45, 90, 180, 360, 720)), (4, (45, 90, 180, 360))):
+        for count in counts:
+            name = f"continuum, {layers} layer{'s' * (layers > 1)}"
+            measure(name, lambda n=count, k=layers: ContinuumLining(scene.ring, columns=n, layers=k), count)
     _draw_errors(curves)
+    head = ("model", "elements around", "CPU time for 50 times [s]", "error of M", "error of displacement")
+    return table(head, (
+        (label, count, f"{s:.2f}", f"{moment:.1e}", f"{w:.1e}")
+        for label, rows in curves.items() for s, moment, w, count in rows
+    ))  # fmt: skip
 
 
 def _draw_errors(curves):
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.4, 3.4), layout="constrained")
+    with picture(IMAGES / "lining_models_error.png", 7.4, 3.4) as figure:
         axes = figure.subplots(1, 2, sharex=True)
         colours = dict(zip(curves, ("0.25", "0.6", "#d98200", "#c1272d", "#0b5394"), strict=True))
         for label, rows in curves.items():
@@ -213,18 +149,16 @@ def _draw_errors(curves):
             axis.grid(True)
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=3)
-        figure.savefig(IMAGES / "lining_models_error.png", dpi=RESOLUTION)
 
 
 def joint_stresses(scene):
     """Hoop stress around joint 2, where the ring opens on the outside."""
     model = ContinuumLining(scene.ring, columns=720, layers=6)
-    stress = model.stress_field(pressures(scene, 2).isel(time=[1])).isel(time=0)
+    stress = model.stress_field(falling_pressures(scene, 2).isel(time=[1])).isel(time=0)
     mesh = model.mesh
     nodes = mesh.element_nodes()[:4]
     corners = np.stack([mesh.node_radius * np.sin(mesh.node_angle), mesh.node_radius * np.cos(mesh.node_angle)], axis=1)
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.4, 3.3), layout="constrained")
+    with picture(IMAGES / "lining_models_stress.png", 7.4, 3.3) as figure:
         axes = figure.subplots(1, 2, sharex=True, sharey=True)
         joint = np.radians(scene.ring.joint_angles[1])
         middle = 3.125 * np.array([np.sin(joint), np.cos(joint)])
@@ -244,20 +178,20 @@ def joint_stresses(scene):
             axis.set_xlabel("x [m]")
             figure.colorbar(patches, ax=axis)
         axes[0].set_ylabel("y from the axis [m]")
-        figure.savefig(IMAGES / "lining_models_stress.png", dpi=RESOLUTION)
+
+
+BLOCKS = {
+    "differences": difference_table, "cost": cost, "errors": error_over_time, "open gate": open_gate,
+    "details": joint_details,
+}  # fmt: skip
 
 
 def main():
     """Everything, in the order of the document."""
-    need_docs()
-    scene = load_scene("case-3")
-    difference_table(scene)
-    cost(scene)
-    error_over_time(scene)
-    open_gate(scene)
-    joint_details(scene)
+    page, scene = docs_page("lining-models", *BLOCKS, "provenance"), load_scene("case-3")
+    filled = {name: measure(scene) for name, measure in BLOCKS.items()}
     joint_stresses(scene)
-    write("provenance", [f"{made_by('uv run python -m verification.reports.lining_models')}."])
+    page.fill(filled | {"provenance": made_by("uv run python -m verification.reports.lining_models")})
 
 
 if __name__ == "__main__":

@@ -1,82 +1,80 @@
-"""CPU time of the beam-spring ring by joint law and number of elements, and its error against closed forms.
+"""Pictures and tables of docs/ring.md: joint laws, an example of checks, errors of the beam-spring ring and its cost.
 
-    uv run python -m verification.reports.ring [RECORDS]    # 1000 when left out
-
-Prints two tables; in the first, pressures fall around 90 degrees as time goes on.
+uv run python -m verification.reports.ring [FOLDER]    # only the pictures, into a folder, when given
 """
 
+import re
 import sys
-import time
+import time as clock
+import tomllib
+from pathlib import Path
 
+import matplotlib
 import numpy as np
 import xarray as xr
 
-from structure import BeamSpringLining, Ground, Ring, theory
+from coupling.figures import GATE, INITIAL, NOW, RESOLUTION, SECOND
+from coupling.figures.utilisations import checks
+from coupling.scenes.scene import load_scene
+from mpm.fields import values
+from structure import BeamSpringLining, Limits, check
+from structure.joint_laws import contact_moment, limited_shear
+from verification.loads import falling_pressures
+from verification.pages import DOCS, docs_page, made_by, picture, table
 from verification.problems import exact_rings
 
-SOIL = dict(
-    youngs_modulus=40e6,
-    poissons_ratio=0.3,
-    cohesion=0.0,
-    friction_angle=25.0,
-    vertical_stress=2.07e5,
-    horizontal_stress=8.9e4,
-)
-RING = dict(
-    outer_diameter=6.6,
-    inner_diameter=5.9,
-    concrete_modulus=34.5e9,
-    concrete_poissons_ratio=0.2,
-    concrete_unit_weight=25e3,
-    joint_angles=(8.0, 73.0, 138.0, 222.0, 287.0, 352.0),
-    joint_rotational_stiffness=5e8,
-    joint_normal_stiffness=6e8,
-    joint_shear_stiffness=8e7,
-)
-ELASTIC = dict(law="linear", two_way=True)
+STIFFNESS, HEIGHT, RECORDS = 5e8, 0.175, 1000  # N m/rad per metre, m
+LINEAR = {"law": "linear", "two_way": True}
+ALL = {"joint_contact_only": True, "joint_contact_height": 0.2, "joint_friction_coefficient": 0.12}
+#: What is measured to changes of the ring of case 3 and of its ground.
 CASES = {
-    "linear joints, linear two-way ground": ({}, ELASTIC),
+    "linear joints, linear two-way ground": ({}, LINEAR),
     "linear joints, hyperbolic ground": ({}, {}),
-    "  the same, 180 elements": (dict(n_elements=180), {}),
-    "  the same, 720 elements": (dict(n_elements=720), {}),
-    "  the same, 1440 elements": (dict(n_elements=1440), {}),
-    "contact-only joints, hyperbolic ground": (dict(joint_contact_only=True), {}),
-    "gaping joints, hyperbolic ground": (dict(joint_contact_height=0.175), {}),
-    "sliding joints, hyperbolic ground": (dict(joint_friction_coefficient=0.1), {}),
-    "all three, hyperbolic ground": (
-        dict(joint_contact_only=True, joint_contact_height=0.2, joint_friction_coefficient=0.12),
-        {},
-    ),
+    **{f"the same, {count} elements": ({"n_elements": count}, {}) for count in (180, 720, 1440)},
+    "contact-only joints, hyperbolic ground": ({"joint_contact_only": True}, {}),
+    "gaping joints, hyperbolic ground": ({"joint_contact_height": HEIGHT}, {}),
+    "sliding joints, hyperbolic ground": ({"joint_friction_coefficient": 0.1}, {}),
+    "all three, hyperbolic ground": (ALL, {}),
 }
 
 
-def event(records):
-    """Theory pressures of case 3 that fall by up to 80 % around the right waist."""
-    base = theory.theoretical_pressures(
-        outer_diameter=6.6, cover=20.0, buoyant_unit_weight=8900.0, coefficient_at_rest=3 / 7
-    )
-    fall = xr.DataArray(np.linspace(0, 0.8, records), dims="time") * np.exp(-(((base["theta"] - 90) / 15) ** 2))
-    moved = {name: (base[name].isel(time=0, drop=True) * (1 - fall)).transpose("time", "theta") for name in base}
-    return xr.Dataset(moved).assign_coords(time=np.arange(records, dtype=float))
+def case_ring(scene, changes, ground):
+    """The ring of a scene with other numbers, its springs at the outer face."""
+    soil = scene.ring.ground.model_copy(update={"slip_at": "outer_face"} | ground)
+    return scene.ring.model_copy(update={"ground": soil} | changes)
 
 
-def closed_form_errors():
-    """Largest errors of N, Q, M and displacement under p cos(2 theta), over element count, with their CPU time."""
-    degrees = np.arange(0.0, 360.0, 0.1)
-    zero = np.zeros((1, len(degrees)))
-    load = 6e4 * np.cos(2 * np.radians(degrees))[None]
-    fields = dict(soil_pressure=load, water_pressure=zero, soil_shear=zero)
-    pressures = xr.Dataset(
-        {name: (("time", "theta"), values) for name, values in fields.items()},
-        coords={"time": [0.0], "theta": degrees},
-    )
-    print(f"{'elements':>8s} {'N':>8s} {'Q':>8s} {'M':>8s} {'w':>8s} {'CPU [s]':>8s}")
-    for count in (24, 45, 90, 180, 360, 720, 1440):
-        ring = Ring(**RING | dict(joint_angles=(), concrete_unit_weight=0.0), n_elements=count)
-        model = BeamSpringLining(ring)
-        start = time.process_time()
+def costs(scene, records):
+    """CPU time, factorisations and residual of every case, for so many records."""
+    pressures = falling_pressures(scene, records, share=0.8)
+    BeamSpringLining(case_ring(scene, {}, {})).respond(pressures.isel(time=slice(2)))  # what loads on first use
+    for name, (changes, ground) in CASES.items():
+        model = BeamSpringLining(case_ring(scene, changes, ground))
+        factors, solver = [0], model._equilibrium.solver
+
+        def counted(*state, factors=factors, solver=solver):
+            factors[0] += 1
+            return solver(*state)
+
+        model._equilibrium.solver = counted
+        begin = clock.process_time()
         response = model.respond(pressures)
-        spent = time.process_time() - start
+        spent = clock.process_time() - begin
+        yield name, f"{spent:.2f}", factors[0], f"{response['equilibrium_residual'].max().item():.1e}"
+
+
+def closed_form_errors(scene):
+    """Largest errors of N, Q, M and displacement under p cos(2 theta), over element count."""
+    degrees = np.arange(0.0, 360.0, 0.1)
+    load, zero = 6e4 * np.cos(2 * np.radians(degrees))[None], np.zeros((1, len(degrees)))
+    fields = {"soil_pressure": load, "water_pressure": zero, "soil_shear": zero}
+    pressures = xr.Dataset(
+        {name: (("time", "theta"), values) for name, values in fields.items()}, {"time": [0.0], "theta": degrees}
+    )
+    plain = {"joint_angles": (), "concrete_unit_weight": 0.0, "ground": None, "support": "free"}
+    for count in (24, 45, 90, 180, 360, 720, 1440):
+        ring = scene.ring.model_copy(update=plain | {"n_elements": count})
+        response = BeamSpringLining(ring).respond(pressures)
         on_centre_line, radius = 6e4 * ring.outer_radius / ring.centre_radius, ring.centre_radius
         exact = exact_rings.radial_cos2(on_centre_line, radius, np.radians(response["theta"].values))
         deflection = exact_rings.radial_cos2_displacement(
@@ -85,24 +83,65 @@ def closed_form_errors():
         errors = [np.abs(response[name][0] - values).max() / np.abs(values).max() for name, values in
                   zip(exact._fields, exact, strict=True)]  # fmt: skip
         errors.append(abs(response["convergence_vertical"].item() / (-2 * deflection) - 1))
-        print(f"{count:8d} " + " ".join(f"{float(error):8.1e}" for error in errors) + f" {spent:8.3f}")
+        yield count, *(f"{float(error):.1e}" for error in errors)
 
 
-def main(records):
-    """Measure every case and print the tables."""
-    pressures = event(records)
-    BeamSpringLining(Ring(**RING, ground=Ground(**SOIL))).respond(pressures.isel(time=slice(2)))
-    print(f"{'case':42s} {'CPU [s]':>8s} {'steps':>8s} {'residual':>9s}")
-    for name, (changes, soil) in CASES.items():
-        model = BeamSpringLining(Ring(**RING | changes, ground=Ground(**SOIL | soil)))
-        start = time.process_time()
-        response = model.respond(pressures)
-        spent = time.process_time() - start
-        residual = response["equilibrium_residual"].max().item()
-        print(f"{name:42s} {spent:8.2f} {sum(model.iterations):8d} {residual:9.1e}")
-    print()
-    closed_form_errors()
+def joint_laws(path):
+    """Moment over rotation for several axial forces, and shear over dislocation through one cycle."""
+    with picture(path, 7.2, 3.1) as figure:
+        left, right = figure.subplots(1, 2)
+        rotation = np.linspace(0, 3e-3, 600)
+        forces = np.array([0.3e6, 0.6e6, 0.9e6, 1.2e6, 1.5e6])
+        for force, shade in zip(forces, np.linspace(0.35, 1.0, len(forces)), strict=True):
+            moment = contact_moment(rotation, np.full_like(rotation, force), STIFFNESS, HEIGHT)[0]
+            colour, end = matplotlib.colormaps["Blues"](shade), (3.0, moment[-1] / 1e3)
+            left.plot(1e3 * rotation, moment / 1e3, color=colour)
+            left.annotate(f"N = {force / 1e3:.0f}", end, (3, 0), textcoords="offset points", va="center", fontsize=7)
+            left.axhline(force * HEIGHT / 2e3, color=colour, lw=0.6, ls=(0, (1, 2)))
+        edge = forces * HEIGHT / 6
+        left.plot(1e3 * edge / STIFFNESS, edge / 1e3, "o-", color=GATE, ms=3, lw=0.8, label="decompression, N h/6")
+        left.plot([], [], color=INITIAL, lw=0.6, ls=(0, (1, 2)), label="on the edge, N h/2")
+        left.set_title(f"gaping: k = {STIFFNESS / 1e6:.0f} MN m/rad per m, h = {HEIGHT} m, N in kN/m")
+        left.set(xlabel="joint rotation [mrad]", ylabel="joint moment [kN m/m]", xlim=(0, 3.0), ylim=(0, 170))
+        left.legend(loc="upper center", ncols=2)
+        path = 1e-3 * np.concatenate([np.linspace(0, 4, 200), np.linspace(4, -4, 400), np.linspace(-4, 3, 350)])
+        for friction, colour in ((0.1, NOW), (0.2, SECOND)):
+            slip, shears = np.zeros(1), []
+            for dislocation in path:
+                shear, *_, slip = limited_shear(np.array([dislocation]), slip, np.array([1.2e6]), 8e7, friction)
+                shears.append(shear[0] / 1e3)
+            right.plot(1e3 * path, shears, color=colour, label=f"μ = {friction}")
+        right.set_title("sliding: k = 80 MN/m per m, N = 1200 kN/m")
+        right.set(xlabel="joint dislocation [mm]", ylabel="joint shear force [kN/m]")
+        right.legend(loc="upper left")
+        for axis in (left, right):
+            axis.grid(True, color="0.9")
+            values(axis.spines, ("top", "right")).set_visible(False)
+
+
+def example_of_checks(scene, limits):
+    """The checks of the ring with joints that gape whose pressures fall around the right waist."""
+    ring = case_ring(scene, {"joint_normal_stiffness": 2e10, "joint_contact_height": HEIGHT}, {})
+    pressures = falling_pressures(scene, 60, share=0.8)
+    return checks(check(BeamSpringLining(ring).respond(pressures), limits))
+
+
+def main(folder=None, records=RECORDS):
+    """Everything, into docs/ring.md, whose example of limits is drawn."""
+    page, scene = docs_page("ring", "made", "closed form", "cost"), load_scene("case-3")
+    images = Path(folder or DOCS / "images")
+    (limits,) = re.findall(r'```toml title="limits.toml"\n(.*?)```', page.text, re.S)
+    example = example_of_checks(scene, Limits.model_validate(tomllib.loads(limits)))
+    example.savefig(images / "ring_checks.png", dpi=RESOLUTION)
+    joint_laws(images / "joint_laws.png")
+    if folder is not None:
+        return
+    page.fill({
+        "made": made_by("uv run python -m verification.reports.ring"),
+        "closed form": table(("elements", "N", "Q", "M", "displacement"), closed_form_errors(scene)),
+        "cost": table(("joints, ground", "CPU s", "factorisations", "residual"), costs(scene, records)),
+    })  # fmt: skip
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 1000)
+    main(*sys.argv[1:2])

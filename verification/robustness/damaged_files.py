@@ -1,86 +1,34 @@
 """Files of a run with damage in them, and what everything that reads them has to make of it."""
 
-import os
-import pickle
 import re
-import resource
-import signal
-import traceback
 
 import numpy as np
 
-#: Longest that reading a damaged file may take [s of processor time], and memory that it may ask for beyond what is in
-#: use [bytes].
-PATIENCE, MEMORY = 20, 4_000_000_000
-#: On the clock it may take so many times as long: a busy machine is no hang, a process that sleeps for good is one.
-BUSY = 15
+from verification.child import in_a_process
+
+#: Longest that reading a damaged file may take [s of processor time].
+PATIENCE = 20
 
 
 def damaged(random, content):
     """Bytes of a file after something happened to it; never what they were."""
     size = len(content)
-    at, length = random.randrange(size), random.choice((1, 8, 512, 4096))
-    kind = random.randrange(9)
+    at, length, kind = random.randrange(size), random.choice((1, 8, 512, 4096)), random.randrange(9)
     if kind <= 2:
         changed = bytearray(content)
         for _ in range(random.choice((1, 1, 1, 4, 64))):
             changed[random.randrange(size)] ^= 1 << random.randrange(8)
         result = bytes(changed)
-    elif kind == 3:
-        result = content[:at] + random.randbytes(length) + content[at + length :]
-    elif kind == 4:
-        result = content[:at] + bytes(length) + content[at + length :]
-    elif kind == 5:
-        result = content[:at]
-    elif kind == 6:
-        result = content[:at] + content[at + length :]
-    elif kind == 7:
-        result = content[:at] + content[at : at + length] + content[at:]
-    else:
+    elif kind == 8:
         # the head is small, and the first thing that a library believes
         at = random.randrange(min(size, 600))
         result = content[:at] + random.randbytes(4) + content[at + 4 :]
+    else:
+        noise, zeros, cut, _, doubled = range(3, 8)  # the other one: a piece is gone
+        middle = random.randbytes(length) if kind == noise else bytes(length) if kind == zeros else b""
+        middle = content[at : at + length] if kind == doubled else middle
+        result = content[:at] + middle + {cut: b"", doubled: content[at:]}.get(kind, content[at + length :])
     return result if result != content else damaged(random, content)
-
-
-def in_a_process(work, seconds=PATIENCE):
-    """What `work` returns, or how it ended: a child with limits keeps a crash, a hang or a flood to itself.
-
-    Returns
-    -------
-    str, object
-        "returned" and the value; "raised" and (type name, message, traceback); "killed" and the signal's name.
-    """
-    read, write = os.pipe()
-    child = os.fork()
-    if child == 0:
-        os.close(read)
-        code = 1
-        try:
-            used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
-            resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, used + MEMORY))
-            signal.setitimer(signal.ITIMER_PROF, seconds)
-            signal.alarm(BUSY * seconds)
-            try:
-                answer = "returned", work()
-            except Exception as error:
-                answer = "raised", (_kinds(error), str(error), traceback.format_exc())
-            with os.fdopen(write, "wb") as out:
-                pickle.dump(answer, out)
-            code = 0
-        finally:
-            os._exit(code)
-    os.close(write)
-    with os.fdopen(read, "rb") as answer:
-        data = answer.read()
-    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    if code < 0:
-        return "killed", signal.Signals(-code).name
-    return pickle.loads(data) if code == 0 else ("killed", f"exit code {code}")
-
-
-def _kinds(error):
-    return {kind.__name__ for kind in type(error).__mro__}
 
 
 def run_content(path):
@@ -172,7 +120,7 @@ def judged(path, kind, whole, before_change=None):
     """
     reader, guarded = READERS[kind]
     before = path.read_bytes()
-    how, answer = in_a_process(lambda: reader(path))
+    how, answer = in_a_process(lambda: reader(path), PATIENCE)
     assert path.read_bytes() == before, "the file was changed by reading it"
     assert how != "killed", f"{kind}: the process was ended by {answer}"
     if how == "raised":

@@ -17,7 +17,7 @@ import traceback
 from collections import Counter
 from pathlib import Path
 
-from verification.pages import need_docs
+from verification.robustness.page import check_page, write_part
 
 COUNTS = {"scenes": 10_000, "files": 1_000, "pressures": 2_000, "rings": 200}
 PYTHON_EVERY = 4  # every so many scenes also as Python dictionaries
@@ -53,10 +53,7 @@ def main():
     parser.add_argument("--count", type=int)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    from verification.robustness.page import write_part
-
-    need_docs()
-
+    check_page()
     faults = 0
     for what in [options.what] if options.what else COUNTS:
         count = options.count or COUNTS[what]
@@ -77,28 +74,27 @@ def scenes(place, count, seed):
     from verification.small_event import small_scene
 
     file, bases = place / "mine.toml", {name: small_scene(**SHORT, **changes).source for name, changes in BASES.items()}
-    verdicts, dotted, faults, slowest, planned = Counter(), Counter(), [], 0.0, []
-    for number in range(count):
-        chance = random.Random(f"{seed} {number}")
+    verdicts, dotted, slowest, planned = Counter(), Counter(), 0.0, []
+
+    def one(chance, number):
+        nonlocal slowest
         kind = chance.choice(list(bases))
         text = wild_scenes.wild_text(chance, bases[kind])
         file.write_bytes(text.encode("utf-8", "surrogatepass"))
         begin = time.monotonic()
-        try:
-            verdict, said = wild_scenes.judged(lambda: coupling.load_scene(file), "mine.toml", True)
-            if number % PYTHON_EVERY == 0:
-                with contextlib.suppress(ValueError, RecursionError):
-                    data = tomllib.loads(text)
-                    wild_scenes.judged(lambda data=data: coupling.make_scene(data, "dictionary"), "dictionary", False)
-            if number % PYTHON_EVERY == 1:
-                dotted[changed_by_names(chance, place, kind, bases[kind])] += 1
-        except Exception:
-            verdict, said = "fault", traceback.format_exc()
-            faults.append(f"scene {number}: {said[-300:]}")
+        verdict, _ = wild_scenes.judged(lambda: coupling.load_scene(file), "mine.toml", True)
+        if number % PYTHON_EVERY == 0:
+            with contextlib.suppress(ValueError, RecursionError):
+                data = tomllib.loads(text)
+                wild_scenes.judged(lambda: coupling.make_scene(data, "dictionary"), "dictionary", False)
+        if number % PYTHON_EVERY == 1:
+            dotted[changed_by_names(chance, place, kind, bases[kind])] += 1
         slowest = max(slowest, time.monotonic() - begin)
         verdicts[verdict if verdict != "warned" else "planned with a warning"] += 1
         if verdict in ("planned", "warned"):
             planned.append((kind, text))
+
+    faults = each(count, seed, "", one)
     # compiles what the children, which share this process's memory, then find ready
     for kind, changes in BASES.items():
         coupling.run(small_scene(**SHORT, **changes), place / "compiled" / kind.replace(" ", "-"), threads=1)
@@ -111,8 +107,7 @@ def scenes(place, count, seed):
         faults += [fault] if fault else []
     return {
         "verdicts": dict(verdicts.most_common()), "faults": faults, "slowest_seconds": slowest,
-        "bases": list(bases), "dotted": dict(dotted.most_common()),
-        "python_every": PYTHON_EVERY, "simulated": len(simulated), "patience": wild_scenes.PATIENCE,
+        "dotted": dict(dotted.most_common()), "simulated": len(simulated),
     }  # fmt: skip
 
 
@@ -120,13 +115,14 @@ def changed_by_names(chance, place, kind, text):
     """Verdict on a good scene that is changed by dotted names, right and wrong ones."""
     import coupling
     from verification.robustness import wild_scenes
+    from verification.sensitivity.variants import value_at
 
     file = place / f"{kind.replace(' ', '-')}.toml"
     file.write_text(text, encoding="utf-8")
     changes, (name, expected) = wild_scenes.wild_changes(chance)
     verdict, _ = wild_scenes.judged(lambda: coupling.load_scene(file, **changes), "scene", False)
     if verdict != "refused":
-        found = wild_scenes.value_at(coupling.load_scene(file, **changes), name)
+        found = value_at(coupling.load_scene(file, **changes), name)
         assert abs(found - expected) <= 1e-12 * expected, f"{changes}: {name} is {found}"
     return verdict
 
@@ -137,7 +133,7 @@ def simulation_fault(place, text, number):
 
     from coupling import load_scene, run
     from coupling.datasets import raw_groups
-    from verification.robustness.damaged_files import in_a_process
+    from verification.child import in_a_process
 
     scene = place / f"run-{number}.toml"
     scene.write_text(text, encoding="utf-8")
@@ -156,33 +152,41 @@ def simulation_fault(place, text, number):
     return "" if (how, answer) == ("returned", True) else f"run of scene {number} {how}: {str(answer)[-300:]}"
 
 
+def each(count, seed, what, one):
+    """Call `one` with a random.Random and its number, so often; the faults, each with the end of what was said."""
+    faults = []
+    for number in range(count):
+        try:
+            one(random.Random(f"{seed} {what} {number}" if what else f"{seed} {number}"), number)
+        except Exception:
+            faults.append(f"{what} {number}: {traceback.format_exc()[-300:]}")
+    return faults
+
+
 def files(place, count, seed):
     """Judge damaged files of every kind."""
     from verification.robustness import damaged_files
 
-    good = good_files(place / "whole")
-    verdicts, faults = {}, []
+    good, verdicts, faults = good_files(place / "whole"), {}, []
     for kind, share in SHARES.items():
         reader, _ = damaged_files.READERS[kind]
-        target, counts = place / f"damaged {kind}" / kind, Counter()
+        target, counts, before = place / f"damaged {kind}" / kind, Counter(), None
         target.parent.mkdir()
         if kind.endswith(".journal"):
             (target.parent / "run.nc").write_bytes(good["run.nc"].read_bytes())
             before = reader(target)
-        else:
-            before = None
-        target.write_bytes(good[kind].read_bytes())
-        content, whole = good[kind].read_bytes(), reader(target)
-        for number in range(round(share * count)):
-            target.write_bytes(damaged_files.damaged(random.Random(f"{seed} {kind} {number}"), content))
-            try:
-                verdict = damaged_files.judged(target, kind, whole, before)
-            except AssertionError as fault:
-                verdict = "fault"
-                faults.append(f"{kind} {number}: {str(fault)[-300:]}")
-            counts[verdict] += 1
-        verdicts[kind] = dict(counts.most_common())
-    return {"verdicts": verdicts, "faults": faults, "patience": damaged_files.PATIENCE}
+        content = good[kind].read_bytes()
+        target.write_bytes(content)
+        whole = reader(target)
+
+        def one(chance, number, target=target, kind=kind, content=content, whole=whole, before=before, counts=counts):
+            target.write_bytes(damaged_files.damaged(chance, content))
+            counts[damaged_files.judged(target, kind, whole, before)] += 1
+
+        found = each(round(share * count), seed, kind, one)
+        verdicts[kind] = dict(counts.most_common()) | ({"fault": len(found)} if found else {})
+        faults += found
+    return {"verdicts": verdicts, "faults": faults}
 
 
 def good_files(place):
@@ -218,18 +222,16 @@ def pressures(place, count, seed):
     from verification.robustness import wild_pressures
 
     ring, file = coupling.load_scene("case-3").ring.model_dump_json(), place / "mine.nc"
-    verdicts, faults = {}, []
-    for number in range(count):
-        given, true, kind = wild_pressures.wild_pressures(random.Random(f"{seed} {number}"))
+    verdicts = {}
+
+    def one(chance, number):
+        given, true, kind = wild_pressures.wild_pressures(chance)
         given.assign_attrs(ring=ring).to_netcdf(file, engine="h5netcdf")
-        try:
-            verdict = wild_pressures.judged(file, true, kind)
-        except Exception:
-            verdict = "fault"
-            faults.append(f"{kind} {number}: {traceback.format_exc()[-300:]}")
+        verdict = wild_pressures.judged(file, true, kind)
         verdicts.setdefault(kind, Counter())[verdict] += 1
-    return {"verdicts": {kind: dict(verdicts[kind]) for kind in sorted(verdicts)}, "faults": faults,
-            "patience": wild_pressures.PATIENCE}  # fmt: skip
+
+    faults = each(count, seed, "", one)
+    return {"verdicts": {kind: dict(verdicts[kind]) for kind in sorted(verdicts)}, "faults": faults}
 
 
 def rings(place, count, seed):
@@ -241,29 +243,25 @@ def rings(place, count, seed):
 
     models = BeamSpringLining, ContinuumLining
     rng, kinds = np.random.default_rng(seed), list(SPRINGS.values())
-    verdicts, reasons, faults, differences = Counter(), Counter(), [], []
-    for number in range(count):
+    verdicts, reasons, differences = Counter(), Counter(), []
+
+    def one(_, number):
         ring, loads = random_ring(rng, kinds[number % len(kinds)]), random_balanced_loads(rng)
-        try:
-            answers = [outcome(model, ring, loads) for model in models]
-        except Exception:
-            faults.append(f"ring {number}: {traceback.format_exc()[-300:]}")
-            continue
+        answers = [outcome(model, ring, loads) for model in models]
         refused = [isinstance(answer, str) for answer in answers]
         verdicts[{0: "solved by both", 1: "refused by one", 2: "refused by both"}[sum(refused)]] += 1
-        if sum(refused) == 1:
-            faults.append(f"ring {number}: only one model refused: {answers[refused.index(True)]}")
-        elif all(refused):
+        assert sum(refused) != 1, f"only one model refused: {answers[refused.index(True)]}"
+        if all(refused):
             for model, answer in zip(models, answers, strict=True):
                 said, holds = reason(model, ring, loads, answer)
                 reasons[said] += 1
-                if not holds:
-                    faults.append(f"ring {number}: reason that does not hold: {answer}")
+                assert holds, f"reason that does not hold: {answer}"
         else:
             thrusts = [answer["axial_force"].mean().item() for answer in answers]
             differences.append(abs(thrusts[1] / thrusts[0] - 1))
-            if not all(answer["equilibrium_residual"] < 1e-8 for answer in answers):
-                faults.append(f"ring {number}: not in equilibrium")
+            assert all(answer["equilibrium_residual"] < 1e-8 for answer in answers), "not in equilibrium"
+
+    faults = each(count, seed, "ring", one)
     return {"verdicts": dict(verdicts.most_common()), "reasons": dict(reasons.most_common()), "faults": faults,
             "largest_difference": max(differences, default=0.0)}  # fmt: skip
 

@@ -20,7 +20,7 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from verification.pages import need_docs
+from verification.robustness.page import check_page, write_part
 
 KILLED_AGAIN = 0.25  # share of the resumed runs that are killed once more
 FINISHED = "finished"
@@ -32,12 +32,10 @@ def main():
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    need_docs()
+    check_page()
     with tempfile.TemporaryDirectory(prefix="gush-kills-") as place:
         result = kill_and_resume(Path(place), options.kills, random.Random(options.seed))
     result["seed"] = options.seed
-    from verification.robustness.page import write_part
-
     write_part("kills", result)
     for name, value in result.items():
         print(f"{name}: {value}")

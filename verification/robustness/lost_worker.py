@@ -17,8 +17,7 @@ from pathlib import Path
 import numpy as np
 
 import coupling
-from coupling.scenes.scene import load_scene
-from verification.pages import need_docs
+from verification.robustness.page import check_page, write_part
 from verification.small_event import COARSE
 
 #: Of every run: how far it differs from nothing but where and when it was computed.
@@ -29,18 +28,12 @@ def plan(count):
     """The study: runs of a few hundred steps on a mesh of some hundred elements."""
     fixed = {f"discretisation.{name}": value for name, value in COARSE.items()}
     fixed |= {"numerics.relaxation_tolerance": 1e-3, "stop.inflow_mass": 8.0, "stop.time": 0.1, "output.interval": 0.01}
-    fixed |= {"output.snapshot_interval": 1.0}
+    angles, friction = np.linspace(30.0, 150.0, count), np.linspace(22.0, 38.0, count)
     return {
-        "name": "lost-worker",
-        "scene": load_scene("quick").name,
-        "design": "list",
-        "records": 5,
-        "fixed": fixed,
-        "parameters": {
-            "gate.angle": np.linspace(30.0, 150.0, count).tolist(),
-            "soils.0.friction_angle": np.linspace(22.0, 38.0, count).tolist(),
-        },
-    }
+        "name": "lost-worker", "scene": "quick", "design": "list", "records": 5,
+        "fixed": fixed | {"output.snapshot_interval": 1.0},
+        "parameters": {"gate.angle": angles.tolist(), "soils.0.friction_angle": friction.tolist()},
+    }  # fmt: skip
 
 
 def killed_study(count, folder):
@@ -75,7 +68,7 @@ def main():
     chosen = parser.parse_args()
     count = chosen.count
     if not chosen.print_only:
-        need_docs()
+        check_page()
     with tempfile.TemporaryDirectory() as place:
         begin = clock.monotonic()
         parallel, lines, killed = killed_study(count, Path(place) / "parallel")
@@ -88,17 +81,11 @@ def main():
         if name not in MEASURED and not np.array_equal(serial[name], parallel[name], equal_nan=True)
     ]
     result = {
-        "runs": count,
-        "workers_killed": len(killed),
-        "finished": int((parallel["status"] == "finished").sum()),
-        "told_done": sum(line.endswith("done") for line in lines),
-        "different_variables": different,
-        "parallel_seconds": between - begin,
-        "serial_seconds": end - between,
-    }
+        "runs": count, "workers_killed": len(killed), "finished": int((parallel["status"] == "finished").sum()),
+        "told_done": sum(line.endswith("done") for line in lines), "different_variables": different,
+        "parallel_seconds": between - begin, "serial_seconds": end - between,
+    }  # fmt: skip
     if not chosen.print_only:
-        from verification.robustness.page import write_part
-
         write_part("lost_worker", result)
     print(json.dumps(result, indent=1))
     raise SystemExit(0 if not different and result["finished"] == count and killed else 1)

@@ -21,36 +21,16 @@ STRANGE = (
     '"' + 3000 * "x" + '"', '"../../x"', '".."', '"http://127.0.0.1/x"', '"file:///etc/passwd"',
 )  # fmt: skip
 NAMES = (
-    '"../../x"',
-    '".."',
-    '"."',
-    '"/tmp/x"',
-    '"a/b"',
-    '"-rf"',
-    '"x\\u0000"',
-    '"x\\n"',
-    '""',
-    '"ÿ-1"',
+    '"../../x"', '".."', '"."', '"/tmp/x"', '"a/b"', '"-rf"', '"x\\u0000"', '"x\\n"', '""', '"ÿ-1"',
     '"' + 90 * "x" + '"',
-)
+)  # fmt: skip
 BASES = (
     '"/dev/zero"', '"/dev/stdin"', '"http://127.0.0.1/x.toml"', '"mine.toml"', '"."', '"/proc/self/mem"', '"quik"', "3",
     '"x\\u0000"', '"' + 5000 * "a" + '"', '"../../../../etc/passwd"', '"case-4"',
 )  # fmt: skip
 WORDS = (
-    "phi",
-    "friction",
-    "frictionangle",
-    "E",
-    "porosty",
-    "K0",
-    "gaet",
-    "widht",
-    "__class__",
-    "a.b",
-    "''",
-    '"\\u001b"',
-)
+    "phi", "friction", "frictionangle", "E", "porosty", "K0", "gaet", "widht", "__class__", "a.b", "''", '"\\u001b"',
+)  # fmt: skip
 
 
 def wild_text(random, base):
@@ -97,14 +77,6 @@ def wild_changes(random):
     name, given, expected = random.choice(RIGHT)
     wild = {random.choice(DOTTED): random.choice(VALUES) for _ in range(random.choice((0, 0, 1, 1, 2)))}
     return {**wild, name: given}, (name, expected)
-
-
-def value_at(scene, name):
-    """Value of a scene under a dotted name."""
-    value = scene
-    for part in name.split("."):
-        value = value[int(part)] if part.isdecimal() else getattr(value, part)
-    return value
 
 
 def _change(random, lines):

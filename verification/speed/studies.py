@@ -14,9 +14,9 @@ import subprocess
 import sys
 import tempfile
 import time as clock
-from pathlib import Path
 
-from verification.pages import DOCS, need_docs, provenance
+from verification.pages import DOCS, docs_page, provenance, write_data
+from verification.speed.report import study_block
 
 ANGLES = [15.0, 30.0, 45.0, 60.0, 75.0, 90.0]
 #: About two seconds of processor time a case, half of it for files and the ring.
@@ -50,12 +50,7 @@ for name in LOADED:
     import_module(name)
 print(time.process_time())
 """
-WAYS = {
-    "loop, all cores": (LOOP, "0"),
-    "loop, one thread": (LOOP, "1"),
-    "study, two workers": (STUDY, "2"),
-}
-HEADING = "## A study of short cases"
+WAYS = {"loop, all cores": (LOOP, "0"), "loop, one thread": (LOOP, "1"), "study, two workers": (STUDY, "2")}
 
 
 def study_seconds(rounds=3, tell=lambda line: None):
@@ -89,14 +84,10 @@ def study_seconds(rounds=3, tell=lambda line: None):
     best = {name: min(times) for name, times in found.items()}
     path, loop = min(paths, key=sum), min(best["loop, all cores"], best["loop, one thread"])
     return {
-        "rounds": found,
-        "best": best,
-        "path": path,
-        "share_of_loop": best["study, two workers"][0] / loop[0],
+        "rounds": found, "best": best, "path": path, "share_of_loop": best["study, two workers"][0] / loop[0],
         "share_on_idle_cores": sum(path) / min(used for _, used in found["loop, one thread"]),
-        "load": [*load, os.getloadavg()[0]],
-        **provenance(),
-    }
+        "load": [*load, os.getloadavg()[0]], **provenance(),
+    }  # fmt: skip
 
 
 def _python(environment, *arguments):
@@ -105,49 +96,18 @@ def _python(environment, *arguments):
     return [float(word) for word in done.stdout.split()]
 
 
-def section(data):
-    """Lines of the section of docs/performance.md."""
-    path = " + ".join(f"{seconds:.1f}" for seconds in data["path"])
-    return [
-        HEADING,
-        "",
-        "`uv run python -m verification.speed.studies`: six gates on a mesh of 4 m (the scene `coarse` of the "
-        "[how-to](how-to/run-a-study.md)), each with the response of the ring and without pictures; whole processes "
-        "that find kernels and bytecode compiled, in turns, the fastest of "
-        f"{len(data['rounds']['loop, all cores'])} each.",
-        "",
-        "| | s by the clock | s of processor time |",
-        "|---|---|---|",
-        *(f"| {name} | {wall:.1f} | {used:.1f} |" for name, (wall, used) in data["best"].items()),
-        "",
-        f"The study takes {data['share_of_loop']:.2f} of the faster loop by the clock; mean number of running programs "
-        f"{data['load'][0]:.1f} before, {data['load'][1]:.1f} after. Its longest path has "
-        f"{path} s of processor time (until the workers start, their loading, half of their cases, collecting), "
-        f"**{data['share_on_idle_cores']:.2f}** of that of the loop of one thread: what two idle cores would take. "
-        f"Measured {data['date']} at revision {data['revision']} on {data['machine']}.",
-    ]
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--print-only", action="store_true", help="leave docs/performance.md as it is")
     chosen = parser.parse_args()
-    if not chosen.print_only:
-        need_docs()
+    page = None if chosen.print_only else docs_page("performance", "study")
     data = study_seconds(chosen.rounds, lambda line: print(line, file=sys.stderr, flush=True))
-    if not chosen.print_only:
-        write(data)
+    if page is not None:
+        page.fill({"study": study_block(data)})
+        numbers = DOCS / "performance.json"
+        write_data(numbers, json.loads(numbers.read_text(encoding="utf-8")) | {"study": data})
     print(json.dumps(data, indent=1))
-
-
-def write(data, docs=DOCS):
-    """Put the section into docs/performance.md, whose last it is, and the numbers into docs/performance.json."""
-    page, numbers = Path(docs) / "performance.md", Path(docs) / "performance.json"
-    above = page.read_text(encoding="utf-8").split(HEADING)[0].rstrip("\n")
-    page.write_text("\n".join([above, "", *section(data)]) + "\n", encoding="utf-8")
-    stored = json.loads(numbers.read_text(encoding="utf-8")) | {"study": data}
-    numbers.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -10,20 +10,16 @@ acts runs ahead of theirs.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from mpm.fields import (
-    block,
-    numbers,
-    values,
-)
+from mpm.fields import block, numbers
 from mpm.pace.spectrum import Spectrum, spectral_time_step
-from mpm.scene import Numerics, Scene
+from mpm.scene import Numerics
 from mpm.solver import Solver
 from mpm.step.substep import ADVANCE, FOLLOW, PLAN, REMAP, SOLVE
-from verification.problems.boxes import box_mesh
+from verification.boxes import box_mesh, box_scene, hat_functions, place, put, state
 
 DEFAULT = Numerics()
 
@@ -31,6 +27,7 @@ DEFAULT = Numerics()
 # cent further the excess is above 0.1. What grows by less is not hidden: `critical_map` keeps it as `excess`.
 STABLE = 1e-2
 SCANNED = (0.1, 0.3, 0.5, 0.7, 0.85, 1.0, 1.1, 1.2, 1.4, 2.0, 4.0)  # steps looked at, over the spectral one
+ARRAYS = ("points", "nodes", "element_of_point", "start", "order", "occupied", "contents")  # state of a solver
 SMALL = 1e-6  # speed of a perturbation over the wave speed: what it moves is nothing beside an element
 
 
@@ -38,34 +35,9 @@ SMALL = 1e-6  # speed of a perturbation over the wave speed: what it moves is no
 class Column:
     """A column of saturated elastic soil, two cells wide, walls left and right, held at the bottom, free on top.
 
-    Parameters
-    ----------
-    bulk_modulus : float or None
-        Of the water [Pa]; None: dry.
-    hydraulic_conductivity : float
-        [m/s]
-    youngs_modulus : float
-        [Pa]
-    porosity : float
-        [-]
-    size : float
-        Height of a cell [m].
-    aspect : float
-        Width of a cell over its height [-].
-    cells : int
-        Over the height.
-    points : int
-        Per element.
-    positions : str
-        "layout", as the program places them; "random"; "edges"; "vertices": within 1e-4 of one.
-    seed : int
-        Of random positions.
-    skew : float
-        Largest shift of the inner nodes over the cell [-].
-    drainage
-        As in `mpm.scene.Water`.
-    pic_rate, pressure_filter, stress_damping
-        As in `mpm.scene.Numerics`.
+    Its geometry: `size`, height of a cell [m]; `aspect`, width over height; `cells` over the height; `points` an
+    element; `positions`, as of `verification.boxes.place`, and `seed`; `skew`, largest shift of the inner nodes over
+    the cell. The others are those of `mpm.scene`; a bulk modulus of None is dry.
     """
 
     bulk_modulus: float | None = 8e7
@@ -87,30 +59,12 @@ class Column:
 
     def scene(self):
         """The scene of the column."""
-        width, height = 2 * self.size * self.aspect, self.cells * self.size
-        size = {f"element_size{part}": self.size for part in ("", "_lining", "_interior")}
-        wet = self.bulk_modulus is not None
-        water = {
-            "table_depth": 0.0, "density": 1000.0, "bulk_modulus": self.bulk_modulus, "drainage": self.drainage,
-        } if wet else None  # fmt: skip
-        return Scene.model_validate({
-            "name": "column",
-            "box": {"width": width, "depth": height},
-            "water": water,
-            "soils": [{
-                "name": "soil", "top_depth": 0.0, "model": "elastic", "youngs_modulus": self.youngs_modulus,
-                "poissons_ratio": self.poissons_ratio, "cohesion": 0.0, "friction_angle": 30.0, "dilatancy_angle": 0.0,
-                "porosity": self.porosity, "loose_porosity": 0.9, "grain_density": 2650.0,
-                "hydraulic_conductivity": self.hydraulic_conductivity, "k0": 0.5,
-            }],
-            "discretisation": {**size, "gate_radius": self.size, "points_per_element": self.points},
-            "numerics": {
-                "courant": 1.0, "pic_rate": self.pic_rate, "pressure_filter": self.pressure_filter,
-                "stress_damping": self.stress_damping, "critical_step": "altitude", "local_time_stepping": False,
-            },
-            "stop": {"time": 1.0},
-            "output": {"interval": 1.0},
-        })  # fmt: skip
+        geometry = ("size", "aspect", "cells", "positions", "seed", "skew")
+        settings = {name: value for name, value in asdict(self).items() if name not in geometry}
+        return box_scene(
+            "column", self.size, 2 * self.size * self.aspect, self.cells * self.size, model="elastic",
+            loose_porosity=0.9, courant=1.0, critical_step="altitude", local_time_stepping=False, **settings,
+        )  # fmt: skip
 
     def mesh(self):
         """Crossed triangles, inner nodes shifted by up to `skew`."""
@@ -164,17 +118,16 @@ class Amplification:
     def __init__(self, column):
         self.column = column
         self.solver = solver = SteppedAt(column.scene(), column.mesh(), threads=1)
-        if column.positions != "layout":
-            block(solver.points, "x", "y")[:] = _placed(solver, column)
-        solver.points[["stress_xx", "stress_yy", "stress_xy"]] = 0.0
+        place(solver, column.positions, column.seed, off=1e-4)
+        put(solver, stress_xx=0.0, stress_yy=0.0, stress_xy=0.0)
         self._wet = column.bulk_modulus is not None
         speed = solver.wave_speed * SMALL
         stress = speed * solver.wave_speed * 2000.0
-        solver.points["pore_pressure"] = 10 * stress if self._wet else 0.0  # positive, whatever is added
+        put(solver, pore_pressure=10 * stress * self._wet)  # positive, whatever is added
         solver.limit_speed = solver.wave_speed
         self.altitude = solver.time_step_estimate()[0]
         self.spectral, _ = spectral_time_step(Spectrum(solver).of_state(), 0.5 * self.altitude)
-        self._start = _copied(solver)
+        self._start = {name: getattr(solver, name).copy() for name in ARRAYS}
         self._spaces = self._bases(speed, stress)
         self.leak = 0.0
 
@@ -185,32 +138,23 @@ class Amplification:
 
     def matrix(self, dt):
         """Amplification matrix of a step of dt [s]: (size, size) float64."""
-        self._set({})
-        self.solver.step_of(dt)
-        rest = self._get()
-        columns = []
+        rest, columns = self._stepped({}, dt), []
         for k, (_, basis, scale) in enumerate(self._spaces):
             for shape in basis.T:
-                self._set({k: scale * shape})
-                self.solver.step_of(dt)
-                change = [(now - then) for now, then in zip(self._get(), rest, strict=True)]
-                columns.append(np.concatenate([
-                    b.T @ (c / s) for c, (_, b, s) in zip(change, self._spaces, strict=True)
-                ]))  # fmt: skip
-                for c, (_, b, s) in zip(change, self._spaces, strict=True):
-                    c = c / s
-                    self.leak = max(self.leak, float(np.linalg.norm(c - b @ (b.T @ c)) / max(np.linalg.norm(c), 1e-3)))
+                change, column = self._stepped({k: scale * shape}, dt), []
+                for now, then, (_, b, s) in zip(change, rest, self._spaces, strict=True):
+                    c = (now - then) / s
+                    column.append(b.T @ c)
+                    self.leak = max(self.leak, float(np.linalg.norm(c - b @ column[-1]) / max(np.linalg.norm(c), 1e-3)))
+                columns.append(np.concatenate(column))
         return np.stack(columns, axis=1)
 
-    def step(self, state, dt):
-        """State after one step of the solver itself from the rest state plus `state`: (size,) float64."""
-        self._set({})
-        self.solver.step_of(dt)
-        rest = self._get()
-        parts = np.split(state, np.cumsum([basis.shape[1] for _, basis, _ in self._spaces])[:-1])
-        self._set({k: s * b @ part for k, ((_, b, s), part) in enumerate(zip(self._spaces, parts, strict=True))})
-        self.solver.step_of(dt)
-        change = zip(self._get(), rest, self._spaces, strict=True)
+    def step(self, perturbation, dt):
+        """State after one step of the solver itself from the rest state plus `perturbation`: (size,) float64."""
+        rest = self._stepped({}, dt)
+        parts = np.split(perturbation, np.cumsum([basis.shape[1] for _, basis, _ in self._spaces])[:-1])
+        begin = {k: s * b @ part for k, ((_, b, s), part) in enumerate(zip(self._spaces, parts, strict=True))}
+        change = zip(self._stepped(begin, dt), rest, self._spaces, strict=True)
         return np.concatenate([b.T @ ((now - then) / s) for now, then, (_, b, s) in change])
 
     def spectral_radius(self, dt):
@@ -239,71 +183,33 @@ class Amplification:
         return low * self.spectral
 
     def _bases(self, speed, stress):
-        """Invariant space: (column of the points, orthonormal basis, scale) a field."""
+        """Invariant space: (name of the points' variable, orthonormal basis, scale) a field."""
         solver = self.solver
-        element, geometry = solver.element_of_point, solver.geometry[solver.element_of_point]
-        d = values(solver.points, ("x", "y")) - values(geometry, ("x", "y"))
-        n1 = geometry["dn1_dx"] * d[:, 0] + geometry["dn1_dy"] * d[:, 1]
-        n2 = geometry["dn2_dx"] * d[:, 0] + geometry["dn2_dy"] * d[:, 1]
-        hats = np.zeros((len(d), len(solver.mesh.nodes)))
-        for k, weight in enumerate((1 - n1 - n2, n1, n2)):
-            np.add.at(hats, (np.arange(len(d)), solver.mesh.elements[element, k]), weight)
+        element, weights = solver.element_of_point, hat_functions(solver)
+        hats = np.zeros((len(element), len(solver.mesh.nodes)))
+        for k in range(3):
+            np.add.at(hats, (np.arange(len(element)), solver.mesh.elements[element, k]), weights[:, k])
         steps = (element[:, None] == np.arange(len(solver.geometry))).astype(float)
-        slopes = np.hstack([steps * n1[:, None], steps * n2[:, None]])
+        slopes = np.hstack([steps * weights[:, 1:2], steps * weights[:, 2:]])
         hats, steps, linear = (_orthonormal(a) for a in (hats, steps, np.hstack([steps, slopes])))
-        velocities = (
-            ("velocity_solid_x", "velocity_solid_y", "velocity_liquid_x", "velocity_liquid_y")
-            if self._wet
-            else ("velocity_solid_x", "velocity_solid_y")
-        )
-        spaces = [(k, hats, speed) for k in velocities]
-        spaces += [(k, steps, stress) for k in ("stress_xx", "stress_yy", "stress_xy")]
-        if self._wet:
-            spaces.append(("pore_pressure", linear, stress))
-        return spaces
+        phases = ("solid", "liquid") if self._wet else ("solid",)
+        spaces = [(f"velocity_{phase}_{axis}", hats, speed) for phase in phases for axis in "xy"]
+        spaces += [(f"stress_{part}", steps, stress) for part in ("xx", "yy", "xy")]
+        return [*spaces, ("pore_pressure", linear, stress)] if self._wet else spaces
 
-    def _set(self, changes):
-        _restore(self.solver, self._start)
-        for k, change in changes.items():
-            self.solver.points[self._spaces[k][0]] += change
-
-    def _get(self):
-        return [self.solver.points[column].copy() for column, _, _ in self._spaces]
-
-
-ARRAYS = ("points", "nodes", "element_of_point", "start", "order", "occupied", "contents")
-
-
-def _copied(solver):
-    return {name: getattr(solver, name).copy() for name in ARRAYS}
-
-
-def _restore(solver, arrays):
-    for name, kept in arrays.items():
-        getattr(solver, name)[...] = kept
-    solver.time, solver.step_count, solver.long_step_count = 0.0, 0, 0
+    def _stepped(self, changes, dt):
+        """Fields of the spaces a step after the rest state with changes, number of the space to (n_points,)."""
+        solver = self.solver
+        for name, values in self._start.items():
+            getattr(solver, name)[...] = values
+        solver.time, solver.step_count, solver.long_step_count = 0.0, 0, 0
+        for k, values in changes.items():
+            name = self._spaces[k][0]
+            put(solver, **{name: state(solver, name) + values})
+        solver.step_of(dt)
+        return [state(solver, name) for name, _, _ in self._spaces]
 
 
 def _orthonormal(vectors):
     u, s, _ = np.linalg.svd(vectors, full_matrices=False)
     return u[:, s > 1e-9 * s[0]]
-
-
-def _placed(solver, column):
-    """Other positions of the points, each in its element: (n_points, 2) [m]."""
-    rng = np.random.default_rng(column.seed)
-    count = len(solver.points)
-    if column.positions == "random":
-        weight = rng.dirichlet([1.0, 1.0, 1.0], count)
-    else:
-        weight = np.full((count, 3), 1e-4)
-        k = rng.integers(3, size=count)
-        if column.positions == "edges":
-            along = rng.uniform(0.1, 0.9, count)
-            weight[np.arange(count), (k + 1) % 3] = along
-            weight[np.arange(count), (k + 2) % 3] = 1 - along
-        else:
-            weight[np.arange(count), k] = 1.0
-        weight /= weight.sum(axis=1)[:, None]
-    corners = solver.mesh.nodes[solver.mesh.elements[solver.element_of_point]]
-    return np.einsum("pk,pkd->pd", weight, corners)

@@ -1,9 +1,55 @@
-"""The list of extremes of `gush stability`."""
+"""What `gush stability` tries: runs at the edge of what a scene can ask for."""
 
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cache
+from typing import Any
 
-from verification.stability.extremes import Case, decades
+from coupling.refused import SceneError
 from verification.stability.trials import collapse, filled_tunnel, gate, jet, one_point, slurry
+
+
+@dataclass(frozen=True)
+class Case:
+    """One extreme.
+
+    Parameters
+    ----------
+    name : str
+    title : str
+        What is extreme about it.
+    run : callable
+        run(**settings) -> (faults, measures), of `verification.monitor.Monitor`.
+    settings : dict
+    representative : bool
+        One of those that the tests run.
+    """
+
+    name: str
+    title: str
+    run: Callable[..., tuple[list[str], dict[str, float]]]
+    settings: dict[str, Any] = field(default_factory=dict)
+    representative: bool = False
+
+
+class CaseUnknown(SceneError):
+    """A name that is no case of `gush stability`."""
+
+
+def chosen(names):
+    """Cases of these names; `*` stands for any ending, no name for all.
+
+    Raises
+    ------
+    CaseUnknown
+    """
+    known, found = cases(), []
+    for name in names or known:
+        some = [c for k, c in known.items() if k == name or (name.endswith("*") and k.startswith(name[:-1]))]
+        if not some:
+            raise CaseUnknown(f"case '{name}': must be one of {', '.join(known)}; or a beginning of one followed by *")
+        found += [case for case in some if case not in found]
+    return found
 
 
 @cache
@@ -26,7 +72,7 @@ def _boxes():
 
     for value in (1e6, 8e7, 2.2e9, 1e10, 1e11, 1e12):
         yield case(f"K_w={value:.2g}", "bulk modulus of the water [Pa]", bulk_modulus=value)
-    for value in [*decades(1e-12, 1e1), 0.0, 100.0]:
+    for value in [*(10.0**k for k in range(-12, 2)), 0.0, 100.0]:
         yield case(f"k={value:.0e}", "hydraulic conductivity [m/s]", hydraulic_conductivity=value)
     for value in (0.0, 10.0, 30.0, 50.0, 59.0, 60.0):
         yield case(f"phi={value:g}", "friction angle [degree], c = 0.5 kPa", friction_angle=value, cohesion=5e2)
@@ -41,7 +87,7 @@ def _boxes():
     yield case("phi=50,psi=10", "dilatant", friction_angle=50.0, dilatancy_angle=10.0)
     yield case("phi=50,psi=50", "associated flow at 50 degrees", friction_angle=50.0, dilatancy_angle=50.0)
     yield case("tension=1e5", "tensile strength beyond the apex", tensile_strength=1e5)
-    for value in [*decades(1e5, 1e10), 1e3]:
+    for value in [*(10.0**k for k in range(5, 11)), 1e3]:
         yield case(f"E={value:.0e}", "Young's modulus [Pa]", youngs_modulus=value)
     for value in (0.0, 0.45, 0.49, 0.499, 0.5):
         yield case(f"nu={value:g}", "Poisson's ratio [-]", poissons_ratio=value)

@@ -1,12 +1,11 @@
 """The critical time step over decades of every number it depends on: predicted against exact, as one dataset."""
 
 import itertools
-from dataclasses import asdict, fields
+from dataclasses import asdict
 
 import numpy as np
 
 from verification.stability.amplification import DEFAULT, Amplification, Column
-from verification.stability.extremes import decades
 
 POSITIONS = (
     *(("layout", points, 0) for points in (1, 3, 4, 6, 12, 25)),
@@ -20,25 +19,21 @@ UNITS = {
 }  # fmt: skip
 
 
+def decades(first, last):
+    """Powers of ten, both exponents included."""
+    return [10.0**k for k in range(first, last + 1)]
+
+
 def columns():
     """(family, column) of every configuration of the map."""
-    for modulus, stiffness in itertools.product([None, 1e6, *decades(1e7, 1e11), 2.2e9], decades(1e5, 1e10)):
+    for modulus, stiffness in itertools.product([None, 1e6, *decades(7, 11), 2.2e9], decades(5, 10)):
         yield "moduli", Column(bulk_modulus=modulus, youngs_modulus=stiffness)
-    for conductivity, size in itertools.product(decades(1e-12, 1e1), (1e-3, 1e-2, 1e-1, 1.0, 10.0)):
+    for conductivity, size in itertools.product(decades(-12, 1), (1e-3, 1e-2, 1e-1, 1.0, 10.0)):
         yield "permeability", Column(hydraulic_conductivity=conductivity, size=size)
-    for porosity, modulus, conductivity in itertools.product(
-        (0.06, 0.2, 0.45, 0.7, 0.89), (8e7, 2.2e9), (1e-8, 1e-4, 1.0)
-    ):
-        for stiffness in (4e7, 1e10):
-            yield (
-                "porosity",
-                Column(
-                    porosity=porosity,
-                    bulk_modulus=modulus,
-                    hydraulic_conductivity=conductivity,
-                    youngs_modulus=stiffness,
-                ),
-            )
+    ratios, others = (0.06, 0.2, 0.45, 0.7, 0.89), ((8e7, 2.2e9), (1e-8, 1e-4, 1.0), (4e7, 1e10))
+    for porosity, modulus, conductivity, stiffness in itertools.product(ratios, *others):
+        column = {"bulk_modulus": modulus, "hydraulic_conductivity": conductivity, "youngs_modulus": stiffness}
+        yield "porosity", Column(porosity=porosity, **column)
     for (place, points, seed), modulus, ahead in itertools.product(POSITIONS, (None, 8e7), AHEAD):
         column = Column(positions=place, points=points, seed=seed, bulk_modulus=modulus, stress_damping=ahead)
         yield "positions", column
@@ -55,19 +50,6 @@ def columns():
         yield "numerics", Column(pressure_filter=strength, pic_rate=rate)
     for ahead, conductivity in itertools.product((0.1, 1.0, 2.0), (1e-4, 1e-2, 1.0)):
         yield "numerics", Column(stress_damping=ahead, hydraulic_conductivity=conductivity)
-
-
-def measure(column):
-    """Both predicted and the actual critical time step [s], excess of the spectral radius at half of it, leak."""
-    amplification = Amplification(column)
-    actual = amplification.critical_time_step()
-    return {
-        "altitude": amplification.altitude,
-        "spectral": amplification.spectral,
-        "actual": actual,
-        "excess": amplification.spectral_radius(0.5 * actual) - 1.0,
-        "leak": amplification.leak,
-    }
 
 
 def critical_map(chosen=None, progress=None):
@@ -94,28 +76,19 @@ def critical_map(chosen=None, progress=None):
     rows = []
     for number, (family, column) in enumerate(chosen):
         with threadpool_limits(1):  # matrices of some hundred rows: a second thread only waits
-            row = {"family": family, **asdict(column), **measure(column)}
+            amplification = Amplification(column)
+            actual = amplification.critical_time_step()
+            excess = amplification.spectral_radius(0.5 * actual) - 1.0
+        row = {"family": family, **asdict(column), "altitude": amplification.altitude}
+        row |= {"spectral": amplification.spectral, "actual": actual, "excess": excess, "leak": amplification.leak}
         row["bulk_modulus"] = np.nan if column.bulk_modulus is None else column.bulk_modulus
-        rows.append(row | {f"{way}_ratio": row[way] / row["actual"] for way in WAYS})
+        rows.append(row | {f"{way}_ratio": row[way] / actual for way in WAYS})
         if progress is not None:
             progress(number + 1, len(chosen))
-    names = [
-        "family",
-        *(f.name for f in fields(Column)),
-        *WAYS,
-        "actual",
-        *(f"{way}_ratio" for way in WAYS),
-        "excess",
-        "leak",
-    ]
-    data = {
-        name: ("configuration", np.array([row[name] for row in rows]), {"units": UNITS.get(name, "1")})
-        for name in names
-        if name not in ("family", "positions", "drainage")
-    }
-    for name in ("family", "positions", "drainage"):
-        data[name] = ("configuration", np.array([row[name] for row in rows], dtype=object))
-    text = (
-        "critical time step of a column of the solver: predicted by the program, and exact by its amplification matrix"
-    )
+    data = {}
+    for name in rows[0]:
+        values = [row[name] for row in rows]
+        about = () if isinstance(values[0], str) else ({"units": UNITS.get(name, "1")},)
+        data[name] = ("configuration", np.array(values, dtype=object if isinstance(values[0], str) else None), *about)
+    text = "critical time step of a column of the solver: predicted, and exact by its amplification matrix"
     return xr.Dataset(data, attrs={"title": text})

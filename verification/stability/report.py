@@ -1,64 +1,75 @@
-"""Figure, dataset and page of `gush stability`."""
+"""What `gush stability` does: the linear map and the extremes; page, picture and data of both."""
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
-from verification.pages import made_by, provenance
-from verification.stability.extremes import BUG, REFUSED, STABLE
-from verification.stability.linear import WAYS
-from verification.stability.text import EXTREMES, FOUND, LINEAR, READING
+from mpm.scene import Numerics
+from verification.pages import Page, made_by, provenance, table, write_data
+from verification.stability.cases import chosen
+from verification.stability.linear import WAYS, critical_map
+from verification.stability.map_figure import draw_map
+from verification.stability.verdicts import BUG, REFUSED, STABLE, judge_apart
 
 ALLOWED = (0.7, 1.0)  # predicted over actual
 
 
-def extremes_dataset(verdicts):
-    """Verdicts and measures of the extremes: xarray.Dataset over `case`."""
-    import xarray as xr
+def stability(names, linear, out, tell, say=lambda text: None):
+    """Run what is asked for.
 
-    names = sorted({name for v in verdicts for name in v.measures})
-    data = {
-        "verdict": ("case", np.array([v.verdict for v in verdicts], dtype=object)),
-        "title": ("case", np.array([v.title for v in verdicts], dtype=object)),
-        "reason": ("case", np.array([v.reason for v in verdicts], dtype=object)),
-        "seconds": ("case", [v.seconds for v in verdicts], {"units": "s"}),
-    }
-    for name in names:
-        data[name] = ("case", [float(v.measures.get(name, np.nan)) for v in verdicts])
-    return xr.Dataset(data, coords={"case": np.array([v.name for v in verdicts], dtype=object)})
+    Parameters
+    ----------
+    names : list of str
+        Cases; `*` stands for any ending; all, and the linear analysis, when empty.
+    linear : bool
+        Only the linear analysis.
+    out : pathlib.Path or None
+        Folder to write to.
+    tell : callable
+        Called with a line of text for every part.
+    say : callable
+        Called with a text about what is being computed.
+
+    Returns
+    -------
+    dict
+        date, revision, machine; linear: `families` of the map, None when not run; extremes: list of dicts;
+        files: list of paths;  faults: list of sentences.
+    """
+    todo = [] if linear else chosen(names)
+    page = None if out is None else Page(Path(out) / "stability.md", "Stability", ("made", "map", "extremes"))
+    found = None if names else critical_map(progress=lambda n, of: say(f"linear analysis: {n} of {of}"))
+    verdicts = []
+    for case in todo:
+        say(case.name)
+        verdicts.append(judge_apart(case))
+        tell(f"{case.name}: {verdicts[-1].verdict}, {verdicts[-1].seconds:.1f} s")
+    data = {**provenance(), "linear": found if found is None else families(found),
+            "extremes": [asdict(verdict) for verdict in verdicts]}  # fmt: skip
+    faults = [f"{v.name}: {v.reason}" for v in verdicts if v.verdict == BUG]
+    faults += [
+        f"{row['family']}: spectral step is {row['spectral_min']:.2f} .. {row['spectral_max']:.2f} of the critical one"
+        for row in data["linear"] or []
+        if row["spectral_max"] > ALLOWED[1] or row["spectral_min"] < ALLOWED[0]
+    ]
+    return data | {"files": [] if page is None else write(page, data, found), "faults": faults}
 
 
-def write(out, linear, verdicts):
-    """Write stability.nc, .json, .md and images/stability-map.png into a folder; returns the paths."""
-    out = Path(out)
-    (out / "images").mkdir(parents=True, exist_ok=True)
-    paths = [out / "stability.json"]
-    paths[0].write_text(json.dumps(summary(linear, verdicts), indent=1) + "\n", encoding="utf-8")
+def write(page, data, linear):
+    """Write stability.json, the map as stability.nc and a picture, and the page of what was run; returns the paths."""
+    folder = page.path.parent
+    folder.mkdir(parents=True, exist_ok=True)
+    paths, blocks = [write_data(folder / "stability.json", data)], {"made": made_by("gush stability --out docs")}
     if linear is not None:
-        from verification.stability.figures import critical_courant
-
-        paths += [out / "images" / "stability-map.png", out / "stability.nc"]
-        critical_courant(linear).savefig(paths[-2], dpi=150)
-        linear.to_netcdf(paths[-1], group="linear", engine="h5netcdf")
-    if verdicts:
-        mode = "w" if linear is None else "a"
-        extremes_dataset(verdicts).to_netcdf(out / "stability.nc", mode=mode, group="extremes", engine="h5netcdf")
-        paths.append(out / "stability.nc")
-    if linear is not None and verdicts:
-        paths.append(out / "stability.md")
-        paths[-1].write_text(page(linear, verdicts), encoding="utf-8")
-    return sorted(set(paths))
-
-
-def summary(linear, verdicts):
-    """Numbers of both parts: dict with provenance, linear (families, None when not run) and extremes (a list)."""
-    return {
-        **provenance(),
-        "linear": None if linear is None else families(linear),
-        "extremes": [asdict(v) for v in verdicts],
-    }
+        paths += [str(folder / "stability.nc"), str(folder / "images" / "stability-map.png")]
+        linear.to_netcdf(paths[-2], engine="h5netcdf")
+        draw_map(linear, paths[-1])
+        blocks["map"] = [*_families(data["linear"]), "", "![Critical Courant number](images/stability-map.png)", "",
+                         *_reading(linear)]  # fmt: skip
+    if data["extremes"]:
+        blocks["extremes"] = extremes_block(data["extremes"])
+    return sorted([*paths, page.fill(blocks)])
 
 
 def families(linear):
@@ -76,60 +87,24 @@ def families(linear):
     return rows
 
 
-def page(linear, verdicts):
-    """The report docs/stability.md as Markdown."""
-    counts = {name: sum(v.verdict == name for v in verdicts) for name in (STABLE, REFUSED, BUG)}
-    seconds = sum(v.seconds for v in verdicts)
-    lines = [
-        "# Stability: critical time step and extremes",
-        "",
-        f"{made_by('gush stability --out docs')}.",
-        "",
-        *LINEAR.strip().splitlines(),
-        "",
-        "| family | columns | spectral/actual: least | median | most | altitude/actual: least | median | most "
-        "| growth | leak |",
-        "|---|---|---|---|---|---|---|---|---|---|",
-        *(
-            f"| {r['family']} | {r['configurations']} | "
-            + " | ".join(f"{r[f'{way}_{name}']:.2f}" for way in reversed(WAYS) for name in ("min", "median", "max"))
-            + f" | {r['excess_max']:.0e} | {r['leak_max']:.0e} |"
-            for r in families(linear)
-        ),
-        "",
-        "![Critical Courant number](images/stability-map.png)",
-        "",
-        *_reading(linear),
-        *READING.strip().splitlines(),
-        "",
-        "## Extremes",
-        "",
-        *EXTREMES.strip().splitlines(),
-        "",
-        f"{len(verdicts)} cases in {seconds:.0f} s: {counts[STABLE]} stable, {counts[REFUSED]} refused, "
-        f"{counts[BUG]} bugs.",
-        "",
-        "| case | what | verdict | time [s] | steps | energy from nothing | largest stress/bound | mass error "
-        "| reason |",
-        "|---|---|---|---|---|---|---|---|---|",
-        *(_row(v) for v in verdicts),
-        "",
-        *FOUND.strip().splitlines(),
-    ]
-    return "\n".join(lines) + "\n"
+def _families(rows):
+    parts = [f"{way}_{name}" for way in reversed(WAYS) for name in ("min", "median", "max")]
+    head = ("spectral/actual: least", "median", "most", "altitude/actual: least", "median", "most", "growth", "leak")
+    return table(("family", "columns", *head), (
+        (r["family"], r["configurations"], *(f"{r[part]:.2f}" for part in parts), f"{r['excess_max']:.0e}",
+         f"{r['leak_max']:.0e}") for r in rows
+    ))  # fmt: skip
 
 
 def _reading(linear):
     """What the numbers of the map say, one list item a line."""
-    from mpm.scene import Numerics
-
     courant = Numerics().courant
     low, high = (float(getattr(linear.spectral_ratio, name)()) for name in ("min", "max"))
     kept = ALLOWED[0] <= low and high <= ALLOWED[1]
     above = linear.isel(configuration=(linear.altitude_ratio > 1).values)
     usual = linear.isel(configuration=((linear.positions == "layout") & (linear["skew"] == 0)).values)
     growing = linear.isel(configuration=(linear.excess > 1e-5).values)
-    lines = [
+    return [
         f"- Spectral: {low:.3f} .. {high:.3f} of the actual critical step in all {linear.sizes['configuration']} "
         f"columns; required are {ALLOWED[0]:g} .. {ALLOWED[1]:g}: {'kept' if kept else '**not kept**'}.",
         f"- Altitude: {float(linear.altitude_ratio.min()):.2f} .. {float(linear.altitude_ratio.max()):.2f}. Where the "
@@ -139,28 +114,48 @@ def _reading(linear):
         f"- Growth of more than 1e-5 a step at half the actual step in {growing.sizes['configuration']} columns: "
         f"{_described(growing)}.",
     ]
-    return lines
 
 
 def _described(part):
+    names = ("points", "positions", "aspect", "skew", "bulk_modulus", "stress_damping", "excess")
     rows = [
         f"{int(p)} points an element at {place}, aspect {a:g}, skew {k:g}, {'wet' if np.isfinite(m) else 'dry'}"
         f"{'' if s else ', undamped'} ({e:.1e})"
-        for p, place, a, k, m, s, e in zip(
-            *(part[n].values for n in ("points", "positions", "aspect", "skew", "bulk_modulus")),
-            *(part[n].values for n in ("stress_damping", "excess")),
-            strict=True,
-        )
+        for p, place, a, k, m, s, e in zip(*(part[name].values for name in names), strict=True)
     ]
     return "; ".join(rows[:4]) + ("; .." if len(rows) > 4 else "") if rows else "none"
 
 
-def _row(v):
-    m = v.measures
-    if not m:
-        return f"| {v.name} | {v.title} | {v.verdict} | | | | | | {v.reason} |"
-    share = m["most_stress"] / m["stress_bound"] if m["stress_bound"] > 0 else 0.0
-    return (
-        f"| {v.name} | {v.title} | {v.verdict} | {m['time']:.3g} | {m['steps']:.0f} | {m['energy_created']:.1%} | "
-        f"{share:.2f} | {m['mass_error']:.0e} | {v.reason} |"
-    )
+def extremes_block(verdicts):
+    """Lines about the verdicts, dicts of :class:`verification.stability.verdicts.Verdict`."""
+    counts = {name: sum(v["verdict"] == name for v in verdicts) for name in (STABLE, REFUSED, BUG)}
+    said = ", ".join(f"{counts[name]} {name}{'s' * (name == BUG)}" for name in counts)
+    rows = []
+    for v in verdicts:
+        m, cells = v["measures"], [""] * 5
+        if m:
+            share = m["most_stress"] / m["stress_bound"] if m["stress_bound"] > 0 else 0.0
+            cells = [f"{m['time']:.3g}", f"{m['steps']:.0f}", f"{m['energy_created']:.1%}", f"{share:.2f}",
+                     f"{m['mass_error']:.0e}"]  # fmt: skip
+        rows.append([v["name"], v["title"], v["verdict"], *cells, v["reason"]])
+    head = ("time [s]", "steps", "energy from nothing", "largest stress/bound", "mass error", "reason")
+    seconds = sum(v["seconds"] for v in verdicts)
+    return [f"{len(verdicts)} cases in {seconds:.0f} s: {said}.", "", *table(("case", "what", "verdict", *head), rows)]
+
+
+def shown_tables(data):
+    """Tables of both parts for the terminal: list of rich.table.Table."""
+    from rich.table import Table
+
+    made = []
+    if data["linear"]:
+        made.append(Table("family", "columns", "spectral", "altitude", title="predicted / actual critical step"))
+        for row in data["linear"]:
+            ratios = (f"{row[f'{way}_min']:.2f} .. {row[f'{way}_max']:.2f}" for way in ("spectral", "altitude"))
+            made[-1].add_row(row["family"], str(row["configurations"]), *ratios)
+    if data["extremes"]:
+        made.append(Table("case", "verdict", "s", "energy from nothing", "reason"))
+        for v in data["extremes"]:
+            share = f"{v['measures']['energy_created']:.1%}" if "energy_created" in v["measures"] else ""
+            made[-1].add_row(v["name"], v["verdict"], f"{v['seconds']:.1f}", share, v["reason"])
+    return made

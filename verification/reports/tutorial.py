@@ -1,6 +1,6 @@
 """Make the pictures of docs/tutorial.md and of the page of a study with the program itself.
 
-uv run python -m verification.pictures.tutorial [tutorial | study]
+uv run python -m verification.reports.tutorial [tutorial | study]
 """
 
 import shutil
@@ -13,7 +13,7 @@ from PIL import Image
 
 import coupling
 from coupling.report.page import write_report
-from verification.pages import DOCS, need_docs
+from verification.pages import DOCS, docs_page
 
 FIGURES = ("fields", "pressures", "internal_forces")
 WIDTH, COLOURS = 1100, 128  # pixels, and colours enough for flat areas and lines
@@ -69,7 +69,7 @@ def draw_study(folder, target):
 
 def main(what):
     """Draw one group of pictures, or all."""
-    need_docs()
+    docs_page("tutorial")
     images = DOCS / "images"
     with tempfile.TemporaryDirectory() as folder:
         if what in ("", "tutorial"):

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from mpm.fields import block, values
-from mpm.scene import Scene
+from mpm.fields import block
 from mpm.solver import Solver
 from mpm.step.substep import ADVANCE, FOLLOW, PLAN, REMAP, SOLVE, UPDATE
 from mpm.walls.contact import FIXED_X, FIXED_Y
@@ -38,6 +37,10 @@ class DrivenSolver(Solver):
         self.driven, self.velocity = np.zeros(shape, bool), np.zeros(shape)
         self.driven_liquid, self.velocity_liquid = np.zeros(shape, bool), np.zeros(shape)
         self.force, self.reaction = np.zeros(shape), np.zeros(shape)
+
+    def let_drain(self, conductivity, gravity=9.81):
+        """Give a weightless scene the drag that its conductivity [m/s] has under gravity [m/s2]."""
+        self.soils["drag"] = gravity / conductivity
 
     def _advance(self, batch):
         self._run(PLAN, SOLVE, batch)
@@ -74,30 +77,7 @@ class DrivenSolver(Solver):
             block(row, "velocity_liquid_x", "velocity_liquid_y")[:] += jump
             block(row, "change_liquid_x", "change_liquid_y")[:] += jump
         moved = self.driven_liquid & full
-        jump = np.where(moved, self.velocity_liquid - values(row, ("velocity_liquid_x", "velocity_liquid_y")), 0.0)
-        block(row, "velocity_liquid_x", "velocity_liquid_y")[:] += jump
-        block(row, "change_liquid_x", "change_liquid_y")[:] += jump
-
-
-def box_scene(name, size, width, depth, soil, water=None, gravity=9.81, points=3, **numerics):
-    """A scene of one soil without a tunnel; `soil` overrides the entries of a cohesionless sand, no `water`: dry.
-
-    `points` and `numerics` are what a problem hands through: points an element, and fields of `mpm.scene.Numerics`.
-    """
-    if water is not None:
-        water = {"table_depth": 0.0, "density": 1000.0, **water}
-    return Scene.model_validate({
-        "name": name, "gravity": gravity, "box": {"width": width, "depth": depth}, "water": water,
-        "soils": [{
-            "name": name, "top_depth": 0.0, "model": "mohr-coulomb", "youngs_modulus": 2e7, "poissons_ratio": 0.3,
-            "cohesion": 0.0, "friction_angle": 30.0, "dilatancy_angle": 0.0, "porosity": 0.4, "loose_porosity": 0.85,
-            "grain_density": 2650.0, "k0": 0.5, **soil,
-        }],
-        "discretisation": {
-            "element_size": size, "element_size_lining": size, "element_size_interior": size, "gate_radius": size,
-            "points_per_element": points,
-        },
-        "numerics": numerics,
-        "stop": {"time": 1.0},
-        "output": {"interval": 1.0},
-    })  # fmt: skip
+        velocity, change = (block(row, f"{name}_liquid_x", f"{name}_liquid_y") for name in ("velocity", "change"))
+        jump = np.where(moved, self.velocity_liquid - velocity, 0.0)
+        velocity += jump
+        change += jump

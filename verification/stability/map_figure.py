@@ -1,16 +1,15 @@
 """The map of the critical Courant number, drawn from its dataset."""
 
-import matplotlib
 import numpy as np
 
-from coupling.figures import GATE, NOW, SECOND, STYLE
-from coupling.figures.picture import Picture
+from coupling.figures import GATE, NOW, SECOND
+from verification.pages import picture
 
 PLACES = ("layout", "random", "edges", "vertices")
 SETS = (("spectral", True, NOW), ("spectral", False, "0.45"), ("altitude", True, SECOND), ("altitude", False, GATE))
 
 
-def critical_courant(linear):
+def draw_map(linear, path):
     """Predicted over actual critical time step over moduli, permeability and mesh size, positions, and element shape.
 
     Parameters
@@ -18,8 +17,7 @@ def critical_courant(linear):
     linear : xarray.Dataset
         Of :func:`verification.stability.linear.critical_map`.
     """
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(8.4, 7.6), layout="constrained")
+    with picture(path, 8.4, 7.6) as figure:
         axes = figure.subplots(3, 2)
         moduli, permeability = _family(linear, "moduli"), _family(linear, "permeability")
         moduli = moduli.isel(configuration=np.isfinite(moduli.bulk_modulus.values))
@@ -32,7 +30,6 @@ def critical_courant(linear):
         figure.colorbar(image, ax=axes[:2], label="predicted / actual critical step [-]", shrink=0.6)
         _positions(axes[2, 0], _family(linear, "positions"))
         _shapes(axes[2, 1], _family(linear, "mesh"))
-    return figure
 
 
 def _family(linear, name):
@@ -46,16 +43,10 @@ def _heat(axis, part, way, x, y, x_label, y_label):
     image = axis.imshow(values, origin="lower", aspect="auto", vmin=0.0, vmax=1.0, cmap="viridis")
     axis.set_xticks(range(len(xs)), [f"{v:.0e}" for v in xs], rotation=60)
     axis.set_yticks(range(len(ys)), [f"{v:.1e}" for v in ys])
+    size = 5 if len(xs) < 9 else 4
     for (j, i), value in np.ndenumerate(values):
-        axis.text(
-            i,
-            j,
-            f"{value:.2f}",
-            ha="center",
-            va="center",
-            fontsize=5 if len(xs) < 9 else 4,
-            color="white" if value < 0.6 else "black",
-        )
+        colour = "white" if value < 0.6 else "black"
+        axis.text(i, j, f"{value:.2f}", ha="center", va="center", fontsize=size, color=colour)
     axis.set_xlabel(x_label)
     axis.set_ylabel(y_label)
     return image

@@ -1,0 +1,48 @@
+"""Generated blocks of the report pages are those of the numbers stored beside them."""
+
+import json
+import re
+
+import pytest
+
+from verification.pages import DOCS, Page, docs_page
+from verification.reports import left_out, lining_in_mpm
+from verification.robustness import page as robustness
+from verification.speed import report as speed
+from verification.stability import report as stability
+
+
+def of_robustness(parts):
+    return {name: robustness.block(name, part) for name, part in parts.items()}
+
+
+def of_stability(data):
+    return {"extremes": stability.extremes_block(data["extremes"])}
+
+
+PAGES = {
+    "left-out": left_out.blocks, "lining-in-mpm": lining_in_mpm.blocks, "performance": speed.blocks,
+    "robustness": of_robustness, "stability": of_stability,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_blocks_of_a_page_are_those_of_its_stored_numbers(name, tmp_path):
+    stored = json.loads((DOCS / f"{name}.json").read_text())
+    blocks = {key: lines for key, lines in PAGES[name](stored).items() if key != "made"}
+    text = docs_page(name, *blocks).text
+    path = tmp_path / "page.md"
+    path.write_text(text)
+    Page(path, name, blocks).fill(blocks)
+    assert re.sub(r"\n\n+", "\n\n", path.read_text()) == re.sub(r"\n\n+", "\n\n", text)
+
+
+def test_page_keeps_what_is_written_by_hand_and_refuses_one_without_its_blocks(tmp_path):
+    path = tmp_path / "page.md"
+    Page(path, "Title", ["one", "two"]).fill({"one": "first", "two": ["a", "b"]})
+    text = path.read_text().replace("# Title\n", "# Title\n\nBy hand.\n")
+    path.write_text(text)
+    Page(path, "Title", ["one"]).fill({"one": r"\1 anew"})
+    assert path.read_text() == text.replace("first", r"\1 anew") and "By hand." in text
+    with pytest.raises(ValueError, match="must mark the block 'three'"):
+        Page(path, "Title", ["three"])

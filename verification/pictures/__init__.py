@@ -1,1 +1,0 @@
-"""Pictures of the docs, drawn with the program itself."""
