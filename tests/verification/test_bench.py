@@ -48,7 +48,7 @@ def test_configurations_differ_in_what_they_leave_out():
     assert scenes["no filter"].numerics.pressure_filter == scenes["no damping"].numerics.stress_damping == 0
     assert not scenes["one time step"].numerics.local_time_stepping
     assert scenes["full"] == whole
-    assert len({str(scene) for scene in scenes.values()}) == len(scenes)
+    assert len({scene.model_dump_json() for scene in scenes.values()}) == len(scenes)
 
 
 def test_step_is_measured_beside_the_reference_and_the_copy():
