@@ -28,6 +28,25 @@ CONTRAST = """(() => {
 })()"""
 
 
+# Name of every chart to what it shows, and the text of the tables and of the slider.
+STATE = """(() => {
+  const at = e => echarts.getInstanceByDom(e.querySelector('.chart')).getZr().flush();
+  const charts = [...document.querySelectorAll('#player [data-chart]')].map(f => [f.dataset.chart, (at(f),
+    f.querySelector('canvas') ? f.querySelector('canvas').toDataURL() : f.querySelector('.chart svg').innerHTML)]);
+  const texts = ['joint-table', 'now-table', 'now'].filter(id => document.getElementById(id));
+  return Object.fromEntries(charts.concat(texts.map(id => [id, document.getElementById(id).innerText])));
+})()"""
+
+
+def drawn(browser, chart, line):
+    """What a chart was given to draw in a line: both coordinates."""
+    points = browser.evaluate(
+        f"echarts.getInstanceByDom(document.getElementById('{chart}')).getOption().series"
+        f".find(s => s.id === '{line}').data.map(p => Array.from(p.value ?? p))"
+    )
+    return tuple(zip(*points, strict=True)) if points else ((), ())
+
+
 def number(text):
     """What is written, as a number."""
     return float(text.replace("−", "-").replace("± ", ""))

@@ -9,7 +9,7 @@ from structure.response import FORCES, PRESSURES, SHOWN
 class Chart(NamedTuple):
     """A chart.
 
-    kind : "ring", "deformed", "time" or "progress" (over time or inflow mass);  keys : quantities in one frame;
+    kind : "ring", "time" or "progress" (over time or inflow mass);  keys : quantities in one frame;
     of_model : whether a lining model answers them;  unit, factor : how they are shown, and to it from SI.
     """
 
@@ -41,7 +41,8 @@ AROUND = tuple(
     Chart(name, _capital(SHOWN[name].name), SHOWN[name].unit, SHOWN[name].scale, "ring", (name,), name in FORCES)
     for name in (*PRESSURES, *FORCES)
 )
-DEFORMED = Chart("deformed", "Deformed ring", "", 1e3, "deformed", ("displacement_radial",), True)
+DEFORMED = Chart("deformation", "Deformation: radial displacement, outward positive", SHOWN["displacement_radial"].unit,
+                 SHOWN["displacement_radial"].scale, "ring", ("displacement_radial",), True)  # fmt: skip
 OF_RING = (
     *(_extremes(f"{name}_extremes", f"Largest and smallest {SHOWN[name].short}", f"{name}_max", f"{name}_min")
       for name in FORCES),

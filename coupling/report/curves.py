@@ -14,7 +14,7 @@ from coupling.report.packing import evenly, levels
 from structure.lining import at_whole_degrees
 from structure.response import FORCES, PRESSURES
 
-MOTION = ("displacement_radial", "displacement_tangential")
+MOTION = ("displacement_radial",)
 JOINTS = ("joint_axial_force", "joint_shear_force", "joint_bending_moment", "joint_opening", "joint_dislocation",
           "joint_rotation")  # fmt: skip
 BYTES_OF_CURVES = 1.8e6  # of everything that has a value for each angle, before it is compressed
@@ -62,7 +62,18 @@ def run_states(run, tunnel, records):
     plain = [part.drop_vars(["time", "inflow_mass", "theta_bnds"], errors="ignore").drop_attrs() for part in parts]
     states = xr.merge(plain, compat="override", join="outer").rename(time="progress")
     mass = history["inflow_mass"].values
-    return states.assign(time=("progress", times)).assign_coords(inflow_mass=("progress", mass))
+    return shape_of_ring(states.assign(time=("progress", times)).assign_coords(inflow_mass=("progress", mass)))
+
+
+def shape_of_ring(states):
+    """The states with the radial displacement of the ring's shape alone: what moves as a whole does not deform."""
+    from coupling.figures.ring import centred
+
+    if "displacement_radial" not in states:
+        return states
+    radial, tangential = (states[f"displacement_{way}"].transpose(..., "theta") for way in ("radial", "tangential"))
+    shape, _ = centred(np.radians(states["theta"].values), radial.values, tangential.values)
+    return states.assign(displacement_radial=radial.copy(data=shape))
 
 
 def budget(states, count, most, detail):
@@ -156,6 +167,9 @@ def ring_series(states):
     for k in range(states.sizes.get("model", 0)):
         model = states.isel(model=k)
         series = ring_extremes(model)
+        if "displacement_radial" in model:
+            shape = extremes(model, ("displacement_radial",)).data_vars
+            series |= {key: values.values for key, values in shape.items() if key != "inflow_mass"}
         if model.sizes.get("joint"):
             series["joint_dislocation_max"] = abs(model["joint_dislocation"]).max("joint").values
         found.append(series | ({"settlement": model["settlement"].values} if "settlement" in model else {}))

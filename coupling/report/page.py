@@ -70,8 +70,8 @@ def rendered(shown: dict[str, Any]) -> str:
     from markupsafe import Markup
 
     from coupling.report.charts import COLUMNS, JOINT_COLUMNS, charts_of
-    from coupling.report.numbers import shown_error
     from coupling.report.numbers import shown as as_read
+    from coupling.report.numbers import shown_error
     from coupling.report.packing import packed
     from coupling.studies.design import value_text
 

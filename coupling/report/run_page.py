@@ -1,10 +1,8 @@
 """What the page about a run shows, collected from its datasets: a study of one case, with all that the run recorded."""
 
-import json
-
 import xarray as xr
 
-from coupling.datasets import RunFileError, identifier, opened, read_run, structure_group
+from coupling.datasets import RunFileError, identifier, opened, read_run
 from coupling.datasets.geometry import gate_of, gate_tunnel, tunnels_beside
 from coupling.datasets.tree import model_names
 from coupling.postprocess.summary import summarise_run
@@ -61,7 +59,7 @@ def collect(run, model=None):
         "balances": [(what, value, VERDICTS.get(good, good), good in (False, "poor")) for what, value, good in rows],
         "facts": [] if scene is None else facts(scene),
         "parts": [] if scene is None else left_out(scene),
-        "ground_options": [(key, one["label"]) for key, one in fields["fields"].items()] if fields else [("", "lining")],
+        "ground_options": [(key, one["label"]) for key, one in (fields or {"fields": {}})["fields"].items()],
         "player": {
             "stops": _stops(rings[None], records),
             "theta": rings[None]["theta"].values[::step].tolist() if "theta" in rings[None].dims else [],
@@ -137,25 +135,13 @@ def _stops(states, records):
 
 def _entry(tree, tunnel, made):
     gate, home = gate_of(tree["lining"].to_dataset()), gate_tunnel(tree["lining"])
-    names = model_names(tree, tunnel)
-    ring = _ring(tree[structure_group(names[0], tunnel)]) if names else {}
     return {
         "number": home if tunnel is None else tunnel,
         "label": f"tunnel {home if tunnel is None else tunnel}",
         "gate": None if gate is None or tunnel is not None else gate.angle,
-        "radii": [ring.get("outer_diameter", 2.0) / 2, ring.get("inner_diameter", 1.8) / 2],
         "at": list(range(len(made["records"]))),
         **made,
     }
-
-
-def _ring(response):
-    try:
-        return json.loads(response.attrs.get("ring", "{}"))
-    except ValueError as error:
-        raise RunFileError(
-            f"run file: damaged, the attribute 'ring' of a response must be JSON, got: {error}; run `gush respond`"
-        ) from None
 
 
 def _recorded(tree, kept):

@@ -9,7 +9,7 @@ from coupling.files.folder import LOG_FILE, REPORT_FILE, RUN_FILE
 from coupling.postprocess.quality import ERRORS
 from coupling.refused import Refused
 from coupling.report.charts import COLUMNS
-from coupling.report.curves import MOST_IN_DETAIL, budget, entry, ring_series, rows_at, slider_stops
+from coupling.report.curves import MOST_IN_DETAIL, budget, entry, ring_series, rows_at, shape_of_ring, slider_stops
 from coupling.report.numbers import Number, finite, ring_numbers, shown
 from coupling.report.packing import evenly
 from coupling.report.trust import balances, case_warnings, last_record
@@ -61,11 +61,11 @@ def collect(folder, beside, model=None):
     player, notes = _player(whole, answers, chosen, plan.records)
     attributes = next(iter(whole.values())).attrs if whole else {}
     if len(chosen) < len(drawn):
-        notes.insert(0, f"Charts hold {len(chosen)} of {len(drawn)} finished cases, evenly chosen; the tables hold all.")
+        notes.insert(0, f"Charts hold {len(chosen)} of {len(drawn)} finished cases, evenly chosen; tables hold all.")
     return {
         "title": f"Gushing into a tunnel: study {plan.name}",
-        "lead": f"{len(rows)} cases over {', '.join({n: None for row in rows for n in row['parameters']})}, computed in "
-                f"{duration(sum(row['cpu_seconds'] or 0.0 for row in done))} of processor time.",
+        "lead": f"{len(rows)} cases over {', '.join({n: None for row in rows for n in row['parameters']})}, computed "
+                f"in {duration(sum(row['cpu_seconds'] or 0.0 for row in done))} of processor time.",
         "status": ("finished" if not lost else "failed" if not done else "partly",
                    f"{len(done)} of {len(rows)} finished"),
         "warnings": _warnings(rows, lost),
@@ -100,8 +100,6 @@ def _player(whole, answers, chosen, available):
         "number": case.index,
         "label": case.name,
         "gate": None if case.scene.mpm.gate is None else case.scene.mpm.gate.angle,
-        "radii": [] if case.scene.ring is None else [case.scene.ring.outer_diameter / 2,
-                                                     case.scene.ring.inner_diameter / 2],
         "at": rows_at(states[case.index], records, stops).tolist(),
         **entry(states[case.index], answers[case.index], records, step, detail),
     } for case in chosen]  # fmt: skip
@@ -118,8 +116,8 @@ def _player(whole, answers, chosen, available):
 def _warnings(rows, lost):
     warned = [f"Case {row['label']}: {text}" for row in rows for text in row["warnings"]]
     if len(warned) > MOST_WARNINGS:
-        warned = [*warned[: MOST_WARNINGS - 1],
-                  f"{len(warned) - MOST_WARNINGS + 1} more are named in the table of balances and warnings."]  # fmt: skip
+        more = len(warned) - MOST_WARNINGS + 1
+        warned = [*warned[: MOST_WARNINGS - 1], f"{more} more are named in the table of balances and warnings."]
     if lost:
         warned.insert(0, f"Without a result: {len(lost)} of {len(rows)} cases; the reasons stand below the design.")
     return warned
@@ -130,7 +128,7 @@ def _loaded(file, models):
     try:
         dataset = at_whole_degrees(read_group_at_once(file), "theta_ring")
         same = "model" not in dataset.dims or tuple(dataset["model"].values) == tuple(models)
-        return dataset if same else dataset.reindex(model=list(models))
+        return shape_of_ring(dataset if same else dataset.reindex(model=list(models)))
     except (OSError, RuntimeError, ValueError, KeyError, AttributeError) as error:
         raise StudyError(unreadable(file, error)) from None
 

@@ -6,16 +6,14 @@ const $ = (id) => document.getElementById(id);
 
 async function unpack() {
   const text = Uint8Array.from(atob($("data").textContent), (c) => c.charCodeAt(0));
-  const bytes = await new Response(new Blob([text]).stream().pipeThrough(new DecompressionStream("deflate"))).arrayBuffer();
-  const head = new Uint32Array(bytes, 0, 1)[0], first = 4 + head;
-  // arrays of two dimensions have a width, rows and all
+  const stream = new Blob([text]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const bytes = await new Response(stream).arrayBuffer(), [head] = new Uint32Array(bytes, 0, 1);
+  // an array of two dimensions has a width
   return JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 4, head)), (_, entry) => {
     if (entry === null || entry.kind === undefined || entry.at === undefined) return entry;
-    const stored = new KINDS[entry.kind](bytes, first + entry.at, entry.shape.reduce((a, b) => a * b, 1));
-    const values = entry.step === undefined ? stored
-      : Float32Array.from(stored, (v) => (v === 65535 ? NaN : entry.low + v * entry.step));
-    values.width = entry.shape[1] || 1;
-    return values;
+    const stored = new KINDS[entry.kind](bytes, 4 + head + entry.at, entry.shape.reduce((a, b) => a * b, 1));
+    const value = (v) => (v === 65535 ? NaN : entry.low + v * entry.step);
+    return Object.assign(entry.step === undefined ? stored : Float32Array.from(stored, value), { width: entry.shape[1] });
   });
 }
 
@@ -31,18 +29,28 @@ function shown(value) {
 }
 
 // Index of the value that is nearest.
-const nearest = (values, value) => values.reduce((best, v, k) => (Math.abs(v - value) < Math.abs(values[best] - value) ? k : best), 0);
+function nearest(values, value) {
+  return values.reduce((best, v, k) => (Math.abs(v - value) < Math.abs(values[best] - value) ? k : best), 0);
+}
 
 // Ends of an axis that hold all these arrays, at round numbers; the upper one `tight` above them.
 function range(arrays, factor, fromZero, tight = false) {
   let low = fromZero ? 0 : Infinity, high = fromZero ? 0 : -Infinity;
-  for (const values of arrays) for (const v of values) { if (v * factor < low) low = v * factor; if (v * factor > high) high = v * factor; }
-  if (!(high > low)) { const pad = Math.abs(low) * 0.1 || 1; [low, high] = low <= high ? [low - pad, high + pad] : [0, 1]; }
+  for (const values of arrays) for (const value of values || []) {
+    if (value * factor < low) low = value * factor;
+    if (value * factor > high) high = value * factor;
+  }
+  if (low > high) [low, high] = [0, 1];
+  const pad = Math.abs(low) * 0.1 || 1;
+  if (low === high) [low, high] = [low - pad, high + pad];
   const raw = (high - low) / 4, power = 10 ** Math.floor(Math.log10(raw));
   const step = [1, 2, 2.5, 5, 10].map((s) => s * power).find((s) => s >= raw * 0.999);
-  return { min: Math.floor(low / step + 1e-9) * step, max: tight && high > 0 ? high + 0.04 * (high - low) : Math.ceil(high / step - 1e-9) * step, interval: step };
+  const top = tight && high > 0 ? high + 0.04 * (high - low) : Math.ceil(high / step - 1e-9) * step;
+  return { min: Math.floor(low / step + 1e-9) * step, max: top, interval: step };
 }
 
 const data = await unpack();
 const stops = data.stops.values, entries = data.entries;
-const state = { stop: stops.length - 1, shape: "polar", against: "value", along: data.stops.along, model: Number($("model")?.value ?? -1) };
+const state = {
+  stop: stops.length - 1, shape: "polar", against: "value", along: data.stops.along, model: Number($("model")?.value ?? -1),
+};
