@@ -17,7 +17,7 @@ from structure.response import FORCES, PRESSURES
 MOTION = ("displacement_radial",)
 JOINTS = ("joint_axial_force", "joint_shear_force", "joint_bending_moment", "joint_opening", "joint_dislocation",
           "joint_rotation")  # fmt: skip
-BYTES_OF_CURVES = 1.8e6  # of everything that has a value for each angle, before it is compressed
+BYTES_OF_CURVES = 1.4e6  # of everything that has a value for each angle, before it is compressed
 BYTES_OF_VALUE = 2
 ANGLE_STEPS = (1, 2, 3, 4)  # take every so many values around the ring before leaving out records
 MOST_STOPS = 240

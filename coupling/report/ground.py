@@ -5,9 +5,9 @@ import numpy as np
 from coupling.datasets.geometry import Tunnel, gate_of, has_tunnels, tunnel_list, tunnel_of
 from coupling.report.packing import evenly, quantised
 
-BYTES_OF_FIELDS = 2.0e6  # of all snapshots, before they are compressed
+BYTES_OF_FIELDS = 1.7e6  # of all snapshots, before they are compressed
 MOST_SNAPSHOTS = 12
-MOST_ELEMENTS = 40_000
+MOST_ELEMENTS = 30_000
 VIEW_RADII = 3.0  # half the width of the view, in outer radii
 COLOURS = 32
 

@@ -16,7 +16,7 @@ from coupling.runs.progress_line import duration
 from coupling.scenes.facts import facts
 from coupling.scenes.scene import parse_scene
 
-MOST_RECORDS = 1000
+MOST_RECORDS = 600
 VERDICTS = {True: "as expected", False: "look at this", None: "–", "poor": "poor: look at this"}
 
 

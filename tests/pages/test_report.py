@@ -1,8 +1,10 @@
 """What the page about a run is made of: key numbers, warnings, and the datasets' values within a budget of bytes."""
 
 import base64
+import hashlib
 import json
 import zlib
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -99,6 +101,16 @@ def test_warnings_name_what_is_missing_or_off(run, tree, tmp_path):
     assert "'interrupted'" in told and "No lining model" in told and "Only 2 records" in told
     datasets.write_response(short, tree["structure/beam_spring"].to_dataset().isel(time=[0]))
     assert "beam-spring holds 1 of 2 records" in " ".join(run_page.collect(short)["warnings"])
+
+
+def test_the_library_is_the_one_that_its_makers_published():
+    """Apache ECharts 6.1.0, dist/echarts.min.js of the npm package, with its licences."""
+    folder = resources.files("coupling.report") / "templates" / "library"
+    digest = hashlib.sha256((folder / "echarts.min.js").read_bytes()).hexdigest()
+    assert digest == "b66b25aeb4df84e33199dc21694014d336d222cbd9deb0e5a7c14bd6aa0d0fd0"
+    for name, text in (("LICENSE-echarts", "Apache License"), ("NOTICE-echarts", "Apache ECharts"),
+                       ("LICENSE-d3", "Bostock")):  # fmt: skip
+        assert text in (folder / name).read_text()
 
 
 # -- what is put into the page ----------------------------------------------------------------------
