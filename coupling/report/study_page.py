@@ -99,7 +99,7 @@ def _player(whole, answers, chosen, available):
     entries = [{
         "number": case.index,
         "label": case.name,
-        "gate": None if case.scene.mpm.gate is None else case.scene.mpm.gate.angle,
+        "gate": None if case.scene.gate is None else case.scene.gate.angle,
         "at": rows_at(states[case.index], records, stops).tolist(),
         **entry(states[case.index], answers[case.index], records, step, detail),
     } for case in chosen]  # fmt: skip

@@ -29,32 +29,31 @@ def initial_theory(scene, theta):
 
     scene : coupling.Scene or None;  theta : (n,) float64 [degree];  returns xarray.Dataset or None.
     """
-    if scene is None or len(scene.mpm.soils) != 1 or len(scene.mpm.tunnels) != 1:
+    if scene is None or len(scene.soils) != 1 or len(scene.tunnels) != 1:
         return None
-    s = scene.mpm
-    soil, tunnel = s.soils[0], s.tunnels[0]
-    if s.water is not None and s.water.table_depth > 0:
+    soil, tunnel = scene.soils[0], scene.tunnels[0]
+    if scene.water is not None and scene.water.table_depth > 0:
         return None
-    least, largest = s.lateral_pressure_range(soil, tunnel.cover, tunnel.cover + tunnel.outer_diameter)
+    least, largest = scene.lateral_pressure_range(soil, tunnel.cover, tunnel.cover + tunnel.outer_diameter)
     if least < largest:
         return None
     from structure import theoretical_pressures
 
-    density = 0.0 if s.water is None else s.water.density
+    density = 0.0 if scene.water is None else scene.water.density
     return theoretical_pressures(
         outer_diameter=tunnel.outer_diameter,
         cover=tunnel.cover,
-        buoyant_unit_weight=(1 - soil.porosity) * (soil.grain_density - density) * s.gravity,
+        buoyant_unit_weight=(1 - soil.porosity) * (soil.grain_density - density) * scene.gravity,
         coefficient_at_rest=least,
-        water_unit_weight=density * s.gravity,
+        water_unit_weight=density * scene.gravity,
         theta=theta,
     )
 
 
 def ground_slips(scene):
     """Whether friction does not bear the shear of the theoretical state on the first lining: soil pressure differs."""
-    tunnel = scene.mpm.tunnels[0]
-    return scene.mpm.bond_friction(tunnel) > tunnel.friction_coefficient
+    tunnel = scene.tunnels[0]
+    return scene.bond_friction(tunnel) > tunnel.friction_coefficient
 
 
 def quality(run, summary, scene=None):

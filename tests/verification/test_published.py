@@ -77,8 +77,8 @@ def test_figures_command_draws_a_study(rehearsal, tmp_path):
 
 def test_theory_of_the_initial_pressures_is_that_of_the_ring():
     scene = coupling.load_scene("case-3")
-    ours = initial_theory(scene, scene.mpm.tunnels[0])
-    soil = scene.mpm.soils[0]
+    ours = initial_theory(scene, scene.tunnels[0])
+    soil = scene.soils[0]
     buoyant = 9.81 * (1 - soil.porosity) * (soil.grain_density - 1000.0)
     theirs = theoretical_pressures(
         outer_diameter=6.6, cover=20.0, buoyant_unit_weight=buoyant, coefficient_at_rest=3 / 7
@@ -172,6 +172,6 @@ def test_full_study_has_the_published_stops_and_a_rehearsal_is_coarse():
     full, rehearsed = plans(), plans(coarse=True)
     assert len(cases(full[0])) == 10 and full[0].backends == ("beam-spring", "continuum")
     end = published_numbers()["gushing"]["end_inflow_mass"]
-    assert {case.scene.mpm.stop.inflow_mass for plan in full[:2] for case in cases(plan)} == {end}
-    sizes = {case.scene.mpm.discretisation.element_size for plan in rehearsed for case in cases(plan)}
-    assert sizes == {coupling.load_scene("quick").mpm.discretisation.element_size}
+    assert {case.scene.stop.inflow_mass for plan in full[:2] for case in cases(plan)} == {end}
+    sizes = {case.scene.discretisation.element_size for plan in rehearsed for case in cases(plan)}
+    assert sizes == {coupling.load_scene("quick").discretisation.element_size}

@@ -89,7 +89,7 @@ def gushing_answers(case: RunEvidence) -> list[Answer]:
                "{:.3g}, {:.3g}, {:.3g} m²/s, bends at {:.3g} and {:.3g} s".format(*stages.rates, *stages.bends),
                stages.appear, "middle of three straight pieces twice as steep as both others"),
     ]  # fmt: skip
-    gate = float(case.scene.mpm.gate.angle)
+    gate = float(case.scene.gate.angle)
     for name in ("soil_pressure", "water_pressure"):
         ratio = postprocess.ratio_to_initial(pressures, name, mass, [gate - 5, gate + 5])
         rows.append(

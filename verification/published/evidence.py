@@ -57,7 +57,7 @@ def evidence(run: CaseRun) -> RunEvidence:
             continue
     last = run.last_mass
     # the layer at the surface must be thicker than the points' distance from it in the largest elements
-    thick = max(1.0, 0.5 * run.scene.mpm.discretisation.element_size)
+    thick = max(1.0, 0.5 * run.scene.discretisation.element_size)
     settlement = postprocess.surface_settlement(points, spacing=max(1.0, thick), depth=thick).to_dataset()
     return RunEvidence(
         run.scene,
@@ -72,7 +72,7 @@ def evidence(run: CaseRun) -> RunEvidence:
             postprocess.with_inflow(postprocess.profile(points, direction), history)
             for direction in ("horizontal", "vertical")
         ),
-        [initial_theory(run.scene, tunnel) for tunnel in run.scene.mpm.tunnels],
+        [initial_theory(run.scene, tunnel) for tunnel in run.scene.tunnels],
     )
 
 
@@ -92,13 +92,13 @@ def initial_theory(scene, tunnel):
     theta = cell_centres()
     angle = np.radians(theta)
     depth = tunnel.axis_depth - tunnel.outer_radius * np.cos(angle)
-    there = [ground_at_axis(scene.mpm, float(d)) for d in depth]
+    there = [ground_at_axis(scene, float(d)) for d in depth]
     vertical = np.array([ground["vertical_stress"] for ground in there])
     horizontal = np.array([ground["horizontal_stress"] for ground in there])
-    water = scene.mpm.water
+    water = scene.water
     pressure = np.zeros_like(depth)
     if water is not None:
-        pressure = water.density * scene.mpm.gravity * np.maximum(depth - water.table_depth, 0.0)
+        pressure = water.density * scene.gravity * np.maximum(depth - water.table_depth, 0.0)
     return xr.Dataset(
         {
             "soil_pressure": ("theta", vertical * np.cos(angle) ** 2 + horizontal * np.sin(angle) ** 2),

@@ -212,7 +212,7 @@ def _word(agrees):
 def _provenance(run):
     from coupling.datasets import read_attributes
 
-    attributes, d = read_attributes(run.folder), run.scene.mpm.discretisation
+    attributes, d = read_attributes(run.folder), run.scene.discretisation
     return (
         f"from runs of revision {attributes['revision'] or 'unknown'} on {attributes['processor']}; elements of "
         f"{d.element_size:g} m, {d.element_size_lining:g} m at the lining, {d.elements_across_gate} across the gate"

@@ -28,7 +28,7 @@ def plans(coarse: bool = False, changes: dict | None = None):
 
     fixed = {}
     if coarse:
-        mesh = load_scene("quick").mpm.discretisation.model_dump()
+        mesh = load_scene("quick").discretisation.model_dump()
         fixed = {f"discretisation.{name}": value for name, value in mesh.items()}
         fixed |= {"stop.inflow_mass": REHEARSAL, "output.interval": 0.005, "output.snapshot_interval": 0.02}
     fixed |= changes or {}

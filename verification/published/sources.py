@@ -32,7 +32,7 @@ class CaseRun:
         from coupling.datasets import read_history
 
         reached = float(read_history(self.folder)["inflow_mass"].max())
-        stop = self.scene.mpm.stop.inflow_mass
+        stop = self.scene.stop.inflow_mass
         return reached if stop is None else min(stop, reached)
 
 
@@ -59,7 +59,7 @@ def case_runs(folder: str | Path) -> list[CaseRun | None]:
 def run_of_scene(runs: list[CaseRun | None], name: str, angle: float | None = None) -> CaseRun | None:
     """The finished run of a scene by its name, and by the angle of its gate where that is given."""
     for run in runs:
-        if run is not None and run.scene.name == name and (angle is None or run.scene.mpm.gate.angle == angle):
+        if run is not None and run.scene.name == name and (angle is None or run.scene.gate.angle == angle):
             return run
     return None
 
