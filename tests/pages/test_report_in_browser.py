@@ -134,6 +134,7 @@ def test_drawn_curves_are_the_datasets(opened, tree, frame, shape):
 
 
 def test_a_click_on_a_chart_moves_the_slider_and_the_mouse_reads_the_ground(opened):
+    opened.evaluate("for (const name of ['beforeprint', 'afterprint']) dispatchEvent(new Event(name))")
     place = opened.evaluate(
         "(() => { const e = document.getElementById('inflow_mass'); e.scrollIntoView({block: 'center'});"
         " const b = e.getBoundingClientRect(), [x, y] = echarts.getInstanceByDom(e)"
@@ -142,6 +143,11 @@ def test_a_click_on_a_chart_moves_the_slider_and_the_mouse_reads_the_ground(open
     for kind in ("mousePressed", "mouseReleased"):
         opened.send("Input.dispatchMouseEvent", type=kind, x=place[0], y=place[1], button="left", clickCount=1)
     assert opened.evaluate("document.getElementById('now').innerText") == "0.5 s, 150 kg/m"
+    start = "echarts.getInstanceByDom(document.getElementById('inflow_mass')).getOption().dataZoom[0].start"
+    for modifiers, moved in ((0, False), (8, True)):  # the wheel alone scrolls the page, with Shift it looks closer
+        opened.send("Input.dispatchMouseEvent", type="mouseWheel", x=place[0], y=place[1], deltaX=0, deltaY=-200,
+                    modifiers=modifiers)  # fmt: skip
+        assert (opened.evaluate(start) > 0) is moved
     choose(opened, "field", "pore_pressure")
     place = opened.evaluate(
         "(() => { const e = document.getElementById('ground'); e.scrollIntoView({block: 'center'});"
@@ -222,7 +228,7 @@ def test_runs_without_ring_or_with_one_record_or_two_tunnels_have_a_page(browser
     one = write_run(tmp_path / "one.nc", times=(0.0,), models=(), status="running")
     browser.open(page.write_report(one, tmp_path / "one.html"))
     assert "'interrupted'" in browser.evaluate("document.querySelector('.warnings').innerText")
-    assert browser.evaluate("document.querySelectorAll('#player .chart > div > svg').length") == 7
+    assert browser.evaluate("document.querySelectorAll('#player .chart svg').length") == 7
     twin = coupling.load_scene("twin-tunnels")
     writer = datasets.RunWriter(tmp_path / "twin.nc", root_attributes(twin), twin)
     for time in (0.0, 1.0):

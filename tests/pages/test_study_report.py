@@ -292,6 +292,7 @@ def test_extremes_over_inflow_mass_and_their_dots_are_the_datasets(opened, study
 def test_boxes_choose_the_cases_by_key_too(opened):
     charts = ("soil_pressure", "bending_moment", "inflow_mass", "bending_moment_extremes")
     lines = (
+        "dispatchEvent(new Event('beforeprint')); dispatchEvent(new Event('afterprint'));"
         "echarts.getInstanceByDom(document.getElementById('{}')).getOption().series"
         ".filter(s => s.id.startsWith('line')).length"
     )

@@ -7,7 +7,8 @@ const AXIS = {
   axisLine: { onZero: false, lineStyle: { color: GREY } }, splitLine: { lineStyle: { color: "#dde2e8" } },
 };
 const UNMARKED = { axisLine: { show: false }, axisTick: { show: false } };
-const ZOOM = { type: "inside", filterMode: "none" };
+// the wheel alone scrolls the page, and so does a finger
+const ZOOM = { type: "inside", filterMode: "none", zoomOnMouseWheel: "shift", preventDefaultMouseMove: false };
 const START = { color: GREY, type: [5, 3], width: 1.4 };
 const line = (id, style, data = [], more = {}) => ({
   id, type: "line", data, lineStyle: style, itemStyle: { color: style.color }, symbol: "none", clip: false, ...more,
@@ -44,9 +45,18 @@ class Chart {
     Object.assign(this, about);
     this.place = $(this.name);
     this.drawn = echarts.init(this.place, null, { renderer });
+    this.waiting = [];
     new ResizeObserver(() => this.drawn.resize()).observe(this.place);
+    new IntersectionObserver(([last]) => { this.seen = last.isIntersecting; if (this.seen) this.flush(); }).observe(this.place);
   }
-  set(option, anew = false) { this.drawn.setOption({ animation: false, ...option }, anew); }
+  // what is out of sight is drawn when it comes into sight: of what waits the last build and the last draw
+  set(option, anew = false) {
+    this.waiting = [...(anew ? [] : this.waiting.filter((w) => w.anew)), { option, anew }];
+    if (this.seen) this.flush();
+  }
+  flush() {
+    for (const { option, anew } of this.waiting.splice(0)) this.drawn.setOption({ animation: false, ...option }, anew);
+  }
   // all values at the place of the mouse
   tooltip(head) {
     const text = (p, v) => `${p.marker}${echarts.format.encodeHTML(p.seriesName)} ${shown(v)} ${this.unit}`;

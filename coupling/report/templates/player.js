@@ -89,7 +89,6 @@ function recorded() {
     const chart = new ProgressChart({ ...one, name: `recorded-${name}`, kind: "time", factor: 1, keys: [] });
     chart.build();
     chart.draw();
-    chart.drawn.getZr().flush();
     views.push(chart);
   }
   $("recorded").dataset.drawn = "yes";
@@ -101,6 +100,7 @@ window.addEventListener("beforeprint", () => {
   unfolded = [...document.querySelectorAll("details:not([open])")];
   for (const part of unfolded) part.open = true;
   if ($("recorded")) recorded();
+  for (const view of views) if (view.drawn) { view.flush(); view.drawn.getZr().flush(); }
   for (const svg of document.querySelectorAll(".chart svg")) {
     svg.setAttribute("viewBox", `0 0 ${svg.getAttribute("width")} ${svg.getAttribute("height")}`);
   }
