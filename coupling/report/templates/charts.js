@@ -45,6 +45,7 @@ class Chart {
     Object.assign(this, about);
     this.place = $(this.name);
     this.drawn = echarts.init(this.place, null, { renderer });
+    this.place.firstElementChild.setAttribute("aria-hidden", "true"); // the name of the place says it in words
     this.waiting = [];
     new ResizeObserver(() => this.drawn.resize()).observe(this.place);
     new IntersectionObserver(([last]) => { this.seen = last.isIntersecting; if (this.seen) this.flush(); }).observe(this.place);
