@@ -10,6 +10,7 @@ MOST_SNAPSHOTS = 12
 MOST_ELEMENTS = 30_000
 VIEW_RADII = 3.0  # half the width of the view, in outer radii
 COLOURS = 32
+NEIGHBOURS = 1.35  # how much larger points are drawn when some are left out
 
 
 def point_fields(points):
@@ -135,8 +136,8 @@ def scaled(values, scale):
 def _snapshot(near, fields, scales, view, largest, most):
     count = near.sizes["point"]
     drawn = evenly(count, most)
-    # fewer points are drawn larger, so that they still cover the ground
-    spread = np.sqrt(count / max(len(drawn), 1))
+    # fewer points are drawn larger, so that they still cover the ground, also where two neighbours are left out
+    spread = 1.0 if len(drawn) == count else NEIGHBOURS * np.sqrt(count / max(len(drawn), 1))
     left, bottom, width = view["x"] - view["half"], view["y"] - view["half"], 2 * view["half"]
     side = np.sqrt(near["volume"].values[drawn])
     return {

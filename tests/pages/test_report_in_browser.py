@@ -143,6 +143,8 @@ def test_a_click_on_a_chart_moves_the_slider_and_the_mouse_reads_the_ground(open
     for kind in ("mousePressed", "mouseReleased"):
         opened.send("Input.dispatchMouseEvent", type=kind, x=place[0], y=place[1], button="left", clickCount=1)
     assert opened.evaluate("document.getElementById('now').innerText") == "0.5 s, 150 kg/m"
+    assert drawn(opened, "inflow_mass", "cursor") == ((0.5, 0.5), (0, 300))
+    assert drawn(opened, "inflow_mass", "dots") == ((0.5,), (150,))
     start = "echarts.getInstanceByDom(document.getElementById('inflow_mass')).getOption().dataZoom[0].start"
     for modifiers, moved in ((0, False), (8, True)):  # the wheel alone scrolls the page, with Shift it looks closer
         opened.send("Input.dispatchMouseEvent", type="mouseWheel", x=place[0], y=place[1], deltaX=0, deltaY=-200,

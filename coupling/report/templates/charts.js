@@ -173,14 +173,16 @@ class ProgressChart extends Chart {
       this.keys.filter((key) => l.from.series[key]).map((key) => ({ ...l, y: l.from.series[key] })));
     this.lines = found.map((l) => ({ ...l, x: l.one.series[along] }));
     const last = Math.max(1e-9, ...this.lines.flatMap((l) => Array.from(l.x).filter(Number.isFinite)));
+    this.axis = range(this.lines.map((l) => l.y), this.factor, !this.of_model && !this.values);
     const known = (point) => point.every(Number.isFinite);
     const points = ({ x, y }) => Array.from(x, (v, j) => [v, y[j] * this.factor]).filter(known);
     this.set({
       grid: { left: 54, right: 18, top: 14, bottom: 42 }, dataZoom: [ZOOM],
       xAxis: { ...AXIS, min: 0, max: last, name: `${name} [${unit}]`, nameGap: 24, splitLine: { show: false } },
-      yAxis: { ...AXIS, ...range(this.lines.map((l) => l.y), this.factor, !this.of_model && !this.values) },
+      yAxis: { ...AXIS, ...this.axis },
       tooltip: this.tooltip((p) => `${name} ${shown(p.data[0])} ${unit}`),
-      series: [...this.lines.map((l, k) => line(`line${k}`, l.style, points(l), { name: l.name })),
+      series: [line("cursor", { color: RED, type: "solid", width: 1.5 }, [], { silent: true }),
+        ...this.lines.map((l, k) => line(`line${k}`, l.style, points(l), { name: l.name })),
         { id: "dots", type: "scatter", symbolSize: 8, silent: true, data: [], z: 5, tooltip: { show: false } }],
     }, true);
     // a click moves the slider where all lines are at the same place
@@ -197,12 +199,9 @@ class ProgressChart extends Chart {
       const at = Number.isFinite(value) ? [x[r], value] : [null, null];
       return { value: at, itemStyle: { color: style.color, borderColor: "#fff" } };
     });
-    const known = this.own ? dots.filter((d) => d.value[0] !== null) : [];
-    const cursor = {
-      silent: true, symbol: "none", label: { show: false }, precision: 9, animation: false,
-      lineStyle: { color: RED, type: "solid", width: 1.5 }, data: known.slice(0, 1).map((d) => ({ xAxis: d.value[0] })),
-    };
-    this.set({ series: [{ id: "dots", data: dots, markLine: cursor }] });
+    const [known] = this.own ? dots.filter((d) => d.value[0] !== null) : [];
+    const cursor = known ? [this.axis.min, this.axis.max].map((y) => [known.value[0], y]) : [];
+    this.set({ series: [{ id: "dots", data: dots }, { id: "cursor", data: cursor }] });
     this.tell([...told.values()].map(({ name, style, values }) => ({ name, style, size: values[0],
       text: values.some(Number.isFinite) ? `${values.map(shown).join(" and ")} ${this.unit}` : "not reached" })));
   }
