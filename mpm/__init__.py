@@ -7,6 +7,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from mpm.laws.law import register_soil_law, soil_law_names
+    from mpm.laws.soil import Soil
     from mpm.mesh import Mesh
     from mpm.meshing import build_mesh
     from mpm.scene import Scene
@@ -21,13 +23,17 @@ _HOMES = {
     "RunFailed": "mpm.solver",
     "Scene": "mpm.scene",
     "Simulation": "mpm.simulation",
+    "Soil": "mpm.laws.soil",
     "Solver": "mpm.solver",
     "build_mesh": "mpm.meshing",
+    "register_soil_law": "mpm.laws.law",
     "simulate": "mpm.simulation",
+    "soil_law_names": "mpm.laws.law",
 }
 
 __all__ = [
-    "Mesh", "Record", "RunFailed", "Scene", "Simulation", "Solver", "build_mesh", "simulate",
+    "Mesh", "Record", "RunFailed", "Scene", "Simulation", "Soil", "Solver", "build_mesh", "register_soil_law",
+    "simulate", "soil_law_names",
 ]  # fmt: skip
 
 

@@ -405,10 +405,9 @@ class Scene(Part):
             at_rest = 1 - math.sin(math.radians(soil.strength[1]))
             raise ValueError(
                 f"soil '{soil.name}': k0 must lie in {max(lowest, 0):.3f} .. {highest:.3f}, what {soil.limits} bear at "
-                f"{depth:g} m, got {soil.k0:g}, which yields from a depth of {yielding:.3g} m; give more strength, or a "
-                "k0 that it bears: "
-                f"1 - sin(friction_angle) = {at_rest:.3g} where the ground was never loaded more, or leave k0 out: "
-                "gravity loading within the strength"
+                f"{depth:g} m, got {soil.k0:g}, which yields from a depth of {yielding:.3g} m; give more strength, or "
+                f"a k0 that it bears: 1 - sin(friction_angle) = {at_rest:.3g} where the ground was never loaded more, "
+                "or leave k0 out: gravity loading within the strength"
             )
 
     @property

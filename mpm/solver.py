@@ -432,7 +432,7 @@ class Solver(Measures):
         self._run(SOLVE, FOLLOW)
 
     def _run(self, first_pass, last_pass, batch=None, advance=True):
-        """Some passes (`mpm.step.substep.PASSES`) of all substeps of long steps, by all threads; None: of one planned."""
+        """Some passes (`mpm.step.substep.PASSES`) of all substeps, by all threads; None: of a long step planned."""
         if batch is None:
             batch = Batch(
                 self.clock.periods[-1:].copy() if advance else np.ones(1, np.int64), np.zeros(0, np.int64), 0, 0

@@ -42,8 +42,8 @@ from coupling.studies.design import cases, load_study, study_names
 
 assert {"quick", "case-3", "twin-tunnels"} <= set(coupling.scene_names())
 assert all(cases(load_study(name)) for name in study_names()) and study_names()
-report = resources.files("coupling") / "report"
-assert {"page.css", "charts.js"} <= {entry.name for entry in report.iterdir()}
+report = resources.files("coupling") / "report" / "templates"
+assert {"page.html", "page.css", "charts.js", "library"} <= {entry.name for entry in report.iterdir()}
 loads = structure.theoretical_pressures(
     outer_diameter=6.6, cover=20.0, buoyant_unit_weight=8.9e3, coefficient_at_rest=0.577
 )

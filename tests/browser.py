@@ -95,7 +95,8 @@ class Browser:
         """Load a local file and wait until its scripts have run."""
         self.send("Page.navigate", url=Path(path).absolute().as_uri())
         end = time.monotonic() + SECONDS
-        while self.evaluate("document.readyState + location.protocol") != "completefile:":
+        drawn = "document.readyState + location.protocol + !!document.querySelector('[aria-busy=true]')"
+        while self.evaluate(drawn) != "completefile:false":
             assert time.monotonic() < end, "the page did not load"
             time.sleep(0.05)
 

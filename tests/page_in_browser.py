@@ -28,6 +28,26 @@ CONTRAST = """(() => {
 })()"""
 
 
+# Name of every chart to what it shows, and the text of the tables and of the slider.
+STATE = """(() => {
+  for (const name of ['beforeprint', 'afterprint']) dispatchEvent(new Event(name)); // draws what is out of sight, too
+  const charts = [...document.querySelectorAll('#player [data-chart]')].map(f => [f.dataset.chart,
+    f.querySelector('canvas') ? f.querySelector('canvas').toDataURL() : f.querySelector('.chart svg').innerHTML]);
+  const texts = ['joint-table', 'now-table', 'now'].filter(id => document.getElementById(id));
+  return Object.fromEntries(charts.concat(texts.map(id => [id, document.getElementById(id).innerText])));
+})()"""
+
+
+def drawn(browser, chart, line):
+    """What a chart was given to draw in a line: both coordinates."""
+    browser.evaluate("for (const name of ['beforeprint', 'afterprint']) dispatchEvent(new Event(name))")
+    points = browser.evaluate(
+        f"echarts.getInstanceByDom(document.getElementById('{chart}')).getOption().series"
+        f".find(s => s.id === '{line}').data.map(p => Array.from(p.value ?? p))"
+    )
+    return tuple(zip(*points, strict=True)) if points else ((), ())
+
+
 def number(text):
     """What is written, as a number."""
     return float(text.replace("−", "-").replace("± ", ""))

@@ -1,11 +1,12 @@
 """The folder of a run: chosen, checked and locked before anything starts, so that nothing existing is lost."""
 
 import contextlib
-import fcntl
 import os
 import shlex
-import time as clock
 from pathlib import Path
+
+import psutil
+from filelock import FileLock, Timeout
 
 from coupling.files.checkpoint import remove_checkpoints
 from coupling.refused import Refused
@@ -13,7 +14,7 @@ from coupling.refused import Refused
 RUN_FILE, MESH_FILE, SCENE_FILE, LOG_FILE, FIGURES = "run.nc", "mesh.vtu", "scene.toml", "run.log", "figures"
 REPORT_FILE, FIELDS = "report.html", "fields"
 LOCK_FILE = ".lock"
-TRIES, SECONDS_BETWEEN_TRIES = 5, 0.02  # for a lock that a look at it may hold for an instant
+SECONDS_FOR_A_LOOK = 0.1  # a look at the lock may hold it for an instant
 
 
 def default_folder(scene_name):
@@ -89,65 +90,51 @@ def reopened(folder):
 
 @contextlib.contextmanager
 def _locked(folder):
-    lock = _lock(folder)
+    """Hold the lock, with this process's number in it; the system drops it when the process ends, however it ends."""
+    path = folder / LOCK_FILE
     try:
+        lock = FileLock(path, timeout=SECONDS_FOR_A_LOOK, thread_local=False)
+        lock.acquire(poll_interval=0.02)
+    except Timeout:
+        raise Refused(
+            f"output folder '{folder}': in use by another run (process {_holder(path) or 'unknown'}); "
+            "wait for it or choose another --out"
+        ) from None
+    except OSError as error:
+        raise Refused(
+            f"output folder '{folder}': not writable: {error.strerror}; choose another --out or change its rights"
+        ) from None
+    try:
+        with contextlib.suppress(OSError):  # Windows lets nobody write into a locked file
+            path.write_text(f"{os.getpid()}\n")
         for left in folder.glob("*.tmp"):  # of a process that was killed, see `coupling.files.replace`
             left.unlink(missing_ok=True)
         yield
     finally:
         with contextlib.suppress(OSError):
-            (folder / LOCK_FILE).unlink()
-        os.close(lock)
+            path.unlink()
+        lock.release()
 
 
-def _lock(folder):
-    """Take the lock; the system drops it when the process ends, however it ends."""
-    path = folder / LOCK_FILE
-    while True:
-        try:
-            lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
-        except OSError as error:
-            raise Refused(
-                f"output folder '{folder}': not writable: {error.strerror}; choose another --out or change its rights"
-            ) from None
-        if not _taken(lock):
-            holder = os.read(lock, 20).decode(errors="replace").strip()
-            os.close(lock)
-            raise Refused(
-                f"output folder '{folder}': in use by another run (process {holder or 'unknown'}); "
-                "wait for it or choose another --out"
-            ) from None
-        # a run that ended in between took the file away under us
-        with contextlib.suppress(FileNotFoundError):
-            if os.stat(path).st_ino == os.fstat(lock).st_ino:
-                os.truncate(lock, 0)
-                os.write(lock, f"{os.getpid()}\n".encode())
-                return lock
-        os.close(lock)
-
-
-def _taken(lock):
-    for _ in range(TRIES):
-        with contextlib.suppress(OSError):
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return True
-        clock.sleep(SECONDS_BETWEEN_TRIES)
-    return False
+def _holder(path):
+    """The number in a lock; None where there is none to read."""
+    with contextlib.suppress(OSError, ValueError):
+        return int(path.read_text())
+    return None
 
 
 def in_use(folder):
     """Whether a process holds the folder of a run: the system drops the lock of one that was killed."""
-    try:
-        lock = os.open(Path(folder) / LOCK_FILE, os.O_RDONLY)
-    except OSError:
+    path = Path(folder) / LOCK_FILE
+    if not path.exists():
         return False
     try:
-        fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except OSError:
+        with FileLock(path, timeout=0, thread_local=False):
+            return False
+    except Timeout:
         return True
-    finally:
-        os.close(lock)
-    return False
+    except OSError:  # no right to write here: ask for the process instead
+        return psutil.pid_exists(_holder(path) or -1)
 
 
 def how_to_go_on(folder):

@@ -1,29 +1,15 @@
-"""Key numbers of a run with what the run itself can say about their error, its quality line and its warnings."""
+"""Key numbers of a run or a case with what it can say about their error itself."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from coupling.datasets import HISTORY, structure_group
-from coupling.datasets.geometry import gate_of, has_tunnels, on_tunnel, tunnel_of, tunnels_beside
-from coupling.datasets.tree import match_times, model_names
-from coupling.postprocess.extremes import RING_EXTREMES, ring_extremes, shown_extreme
-from coupling.postprocess.quality import ERRORS, STATES
+from coupling.datasets.geometry import gate_of, has_tunnels, on_tunnel, tunnel_of
+from coupling.postprocess.extremes import RING_EXTREMES, shown_extreme
 from coupling.postprocess.summary import PLACES
-from mpm.fields import CLAMPS
 
-#: What it means that points meet a limit, by its name in :data:`mpm.fields.CLAMPS`.
-MEANINGS = {
-    "tension": "grains that are not pressed together bear no tension",
-    "suspended": "looser than the loose porosity they do not touch and bear no stress",
-    "cavitated": "water that is missing does not pull",
-    "porosity_floor": "held there; no sound run reaches it",
-    "porosity_ceiling": "held there; no sound run reaches it",
-    "returned_to_mesh": "they would have left the mesh within a step",
-}
-SHEAR_LIMIT = 0.05  # of the largest Q; the slope of M is taken over one element
-THEORY_LIMIT = 0.02  # of the mean pressure; an element at the lining sees the depth of its middle
 DIFFERENCE = "difference from"
+MINUS = "\N{MINUS SIGN}"
 
 
 class Number(NamedTuple):
@@ -48,29 +34,8 @@ class Number(NamedTuple):
         return self.basis.startswith(DIFFERENCE)
 
 
-def key_numbers(run):
-    """What the run came to.
-
-    Parameters
-    ----------
-    run : xarray.DataTree
-        From :func:`coupling.read_run`, with at least one record.
-
-    Returns
-    -------
-    dict
-        Title of a group to its list of Number; groups without numbers are left out.
-    """
-    groups = {"Gushing": _inflow_numbers(run)}
-    for tunnel in (None, *tunnels_beside(run["lining"])):
-        of = "" if tunnel is None else f" of tunnel {tunnel}"
-        groups[f"Pressures on the lining{of}"] = _pressure_numbers(run["lining"].to_dataset(), tunnel)
-        title = ", ".join([f"Forces and deformation of the ring{of}", *model_names(run, tunnel)[:1]])
-        groups[title] = _ring_numbers(run, tunnel)
-    return {title: numbers for title, numbers in groups.items() if numbers}
-
-
-def _inflow_numbers(run):
+def inflow_numbers(run):
+    """What flowed in and what it moved: list of Number. run : xarray.DataTree with at least one record."""
     history = run["history"].to_dataset()
     last, mass = history.isel(time=-1), history["grain_mass"].values
     one_point = _mass_of_a_point_inside(run)
@@ -135,7 +100,8 @@ def scatter(values, spread):
     return float(np.hypot(np.std(np.diff(last)) / np.sqrt(2), spread))
 
 
-def _pressure_numbers(lining, tunnel):
+def pressure_numbers(lining, tunnel=None):
+    """Pressures at crown, waists and invert of a tunnel (None: that with the gate), of `/lining`: list of Number."""
     if "soil_pressure" not in lining:
         return []
     lining = on_tunnel(lining, tunnel)
@@ -163,160 +129,61 @@ def _in_gate(lining, theta):
     return abs((theta - gate.angle + 180) % 360 - 180) <= half
 
 
-def initial_theory(scene, theta):
-    """Theoretical pressures before the gate opens, or None where the closed form does not hold.
-
-    It holds for one tunnel in one soil that is dry, or saturated up to the surface, with one K0 beside the tunnel.
-
-    scene : coupling.Scene or None;  theta : (n,) float64 [degree];  returns xarray.Dataset or None.
-    """
-    if scene is None or len(scene.soils) != 1 or len(scene.tunnels) != 1:
-        return None
-    s = scene
-    soil, tunnel = s.soils[0], s.tunnels[0]
-    if s.water is not None and s.water.table_depth > 0:
-        return None
-    least, largest = s.lateral_pressure_range(soil, tunnel.cover, tunnel.cover + tunnel.outer_diameter)
-    if least < largest:
-        return None
-    from structure import theoretical_pressures
-
-    density = 0.0 if s.water is None else s.water.density
-    return theoretical_pressures(
-        outer_diameter=tunnel.outer_diameter,
-        cover=tunnel.cover,
-        buoyant_unit_weight=(1 - soil.porosity) * (soil.grain_density - density) * s.gravity,
-        coefficient_at_rest=least,
-        water_unit_weight=density * s.gravity,
-        theta=theta,
-    )
-
-
-def ground_slips(scene):
-    """Whether friction does not bear the shear of the theoretical state on the first lining: soil pressure differs."""
-    tunnel = scene.tunnels[0]
-    return scene.bond_friction(tunnel) > tunnel.friction_coefficient
-
-
-def _ring_numbers(run, tunnel):
-    models = model_names(run, tunnel)
-    if not models:
-        return []
-    responses = {name: run[structure_group(name, tunnel)].to_dataset() for name in models}
-    first = responses[models[0]]
-    if not first.sizes["time"]:
-        return []
-    found = ring_extremes(first)
-    start, end = ({key: float(values[row]) for key, values in found.items()} for row in (0, -1))
-    others = []
-    for name in models[1:]:
-        rows, present = match_times(responses[name]["time"].values, first["time"].values[-1:])
-        if present[0]:
-            others.append({key: float(v[rows[0]]) for key, v in ring_extremes(responses[name]).items()})
-    labels = ", ".join(models[1:]) if others else "another lining model: there is none"
-    basis = f"{DIFFERENCE} {labels}"
-    return [
-        Number(key if tunnel is None else f"tunnel_{tunnel}_{key}", *shown_extreme(key), start[key], end[key],
-               max((abs(other[key] - end[key]) for other in others if key in other), default=None), basis)
-        for key in RING_EXTREMES if key in end
-    ]  # fmt: skip
-
-
-def quality(run, summary, scene=None):
-    """Balances and limits that say how far the numbers can be trusted.
+def ring_numbers(names, answers, prefix=""):
+    """Extremes of a ring's forces and deformation at the last record of its first lining model, beside the first.
 
     Parameters
     ----------
-    run : xarray.DataTree
-    summary : dict
-        From :func:`coupling.postprocess.summary.summarise_run`.
-    scene : coupling.Scene or None
-        For the theory of the initial pressures.
+    names : list of str
+        Lining models.
+    answers : list of dict
+        Of each: keys of `RING_EXTREMES` to (n_records,) float64, NaN where it has no record.
+    prefix : str
+        Of the keys.
 
     Returns
     -------
-    list of (str, str, str, bool or None)
-        What, how much, and its verdict: a word of :data:`coupling.postprocess.quality.ERRORS`, or whether it is within
-        what is expected; None where nothing is expected of it.
+    list of Number
+        Their error is the largest difference from the other models at the same record.
     """
-    values = summary["quality"]
-    rows = [(ERRORS[name].label, ERRORS[name].text(values[name]), verdict)
-            for name, verdict in summary["verdicts"].items()]  # fmt: skip
-    rows += _against_theory(run["lining"].to_dataset(), scene)
-    answers = [(model, k) for k in (None, *tunnels_beside(run["lining"])) for model in model_names(run, k)]
-    for model, tunnel in answers:
-        response = run[structure_group(model, tunnel)].to_dataset()
-        name = model if tunnel is None else f"{model}, tunnel {tunnel}"
-        if not response.sizes["time"]:
-            continue
-        if "equilibrium_residual" in response:
-            worst = float(np.abs(response["equilibrium_residual"]).max())
-            rows.append((f"equilibrium of the ring, {name}: largest unbalanced share", f"{worst:.1e}",
-                         ERRORS["lining_equilibrium"].verdict(worst)))  # fmt: skip
-        if "shear_moment_residual" in response:
-            share = float(np.abs(response["shear_moment_residual"]).max() / np.nanmax(np.abs(response["shear_force"])))
-            rows.append((f"Q = -dM/ds, {name}: largest departure over the largest Q", f"{share:.1e}",
-                         share <= SHEAR_LIMIT))  # fmt: skip
-    points = {clamp: f"{values[name]:.1%} of points at most, " for name, clamp in STATES.items() if name in values}
-    rows += [(f"{label}: {MEANINGS[name]}", f"{points.get(name, '')}{values['clamps'][name]:.2%} of point-steps", None)
-             for name, label in CLAMPS.items()]  # fmt: skip
-    for name, variable in run["history"].to_dataset().data_vars.items():
-        if name not in HISTORY and variable.dims == ("time",):
-            worst, unit = float(np.abs(variable).max()), variable.attrs.get("units", "")
-            rows.append((f"{variable.attrs.get('long_name', name)}: largest size",
-                         f"{worst:.3g} {'' if unit == '1' else unit}".strip(), None))  # fmt: skip
-    return rows
-
-
-def _against_theory(lining, scene):
-    """Initial pressures of the first record against K0 and hydrostatic theory, the mean of which is the measure."""
-    theory = initial_theory(scene, lining["theta"].values) if "soil_pressure" in lining else None
-    if theory is None:
+    first = answers[0] if answers else {}
+    known = [np.flatnonzero(np.isfinite(first[key])) for key in RING_EXTREMES if key in first]
+    end = max((int(rows[-1]) for rows in known if len(rows)), default=None)
+    if end is None:
         return []
-    rows = []
-    for name, label in (("soil_pressure", "soil"), ("water_pressure", "water")):
-        expected = theory[name].isel(time=0).values
-        worst, mean = float(np.abs(lining[name].isel(time=0).values - expected).max()), float(expected.mean())
-        if mean > 0:
-            what = f"initial {label} pressure against theory, largest difference at any angle"
-            size = f"{worst / 1e3:.2g} kPa, {100 * worst / mean:.2g} % of the mean"
-            slips = name == "soil_pressure" and ground_slips(scene)
-            size += ", the ground has slipped along the lining" if slips else ""
-            rows.append((what, size, None if slips else worst <= THEORY_LIMIT * mean))
-    return rows
+    others = [answer for answer in answers[1:] if np.isfinite(answer.get("axial_force_max", [np.nan] * (end + 1))[end])]
+    basis = f"{DIFFERENCE} {', '.join(names[1:]) if others else 'another lining model: there is none'}"
+    numbers = []
+    for key in RING_EXTREMES:
+        if key in first:
+            apart = [abs(float(other[key][end] - first[key][end])) for other in others if key in other]
+            error = max((value for value in apart if np.isfinite(value)), default=None)
+            numbers.append(Number(prefix + key, *shown_extreme(key), finite(first[key][0]), finite(first[key][end]),
+                                  error, basis))  # fmt: skip
+    return numbers
 
 
-def warnings(run, attributes, quality_rows):
-    """What a reader must know before believing the page: list of str."""
-    found = []
-    if attributes["status"] != "finished":
-        message = attributes.get("status_message") or "the page shows what was computed until then"
-        found.append(f"The run is '{attributes['status']}': {message}.")
-    remedies = {judged.label: f"; {judged.remedy}" for judged in ERRORS.values()}
-    found += [
-        f"Outside what is expected: {what}: {value}{remedies.get(what, '')}."
-        for what, value, good in quality_rows if good in (False, "poor")
-    ]  # fmt: skip
-    lining = run["lining"].to_dataset()
-    records = lining.sizes["time"]
-    models = model_names(run)
-    if "soil_pressure" in lining and not models:
-        found.append("No lining model has answered to the pressures: run `gush respond` on this run.")
-    for tunnel in tunnels_beside(run["lining"]) if models else ():
-        if not model_names(run, tunnel):
-            found.append(f"No lining model has answered for tunnel {tunnel}: run `gush respond` on this run.")
-    for name in models:
-        answered = run[structure_group(name)].sizes.get("time", 0)
-        if answered != records:
-            found.append(f"The response of {name} holds {answered} of {records} records: run `gush respond` again.")
-    if "soil_pressure" in lining and records > 1:
-        last = lining.isel(time=-1)
-        for name, label in (("soil_pressure", "soil"), ("water_pressure", "water")):
-            share = float(last[f"{name}_std"].mean() / max(float(np.abs(last[name]).mean()), 1e-9))
-            if share > 0.25:
-                found.append(f"The {label} pressure still fluctuates: by {share:.0%} of its mean within an interval.")
-    if records < 10:
-        found.append(f"Only {records} records: what happens between them is not shown.")
-    if str(attributes.get("revision", "")).endswith("+changed"):
-        found.append(f"The program's files differed from its revision {attributes['revision']}.")
-    return found
+def finite(value):
+    """A number as float; None for NaN."""
+    return float(value) if np.isfinite(value) else None
+
+
+def shown(value, unit=""):
+    """A number as people read it: three significant digits, whole from 100 on, a true minus sign (as in data.js)."""
+    if value is None:
+        return "–"
+    if value != 0 and (abs(value) >= 1e6 or abs(value) < 1e-4):
+        mantissa, power = f"{value:.2e}".split("e")
+        text = f"{mantissa}e{int(power)}"
+    elif abs(value) >= 100:
+        text = f"{value:.0f}"
+    else:
+        text = f"{float(f'{value:.3g}')!r}".removesuffix(".0")
+    return f"{text.replace('-', MINUS)} {unit}".strip()
+
+
+def shown_error(number):
+    """The error of a Number, in its unit: known to two digits at best."""
+    if number.error is None:
+        return "–"
+    return f"{'' if number.is_difference else '± '}{shown(float(f'{number.error * number.scale:.2g}'))}"

@@ -1,36 +1,70 @@
-"""Arrays as text: the part of a run's numbers that a page carries, within a budget of bytes."""
+"""The numbers of a page as one compressed text: JSON in which arrays stand as places in the bytes behind it."""
 
 import base64
+import json
+import struct
+import zlib
+from typing import NamedTuple
 
 import numpy as np
 
-#: A base64 text is this much longer than its bytes.
-BASE64 = 4 / 3
+ALIGNMENT = 4
 
 
-def packed(values, kind="f4"):
-    """An array as {kind, shape, data}: little-endian, base64, rounded to `kind` ("f4", "u1", "u2", "u4")."""
-    array = np.ascontiguousarray(values, dtype=f"<{kind}")
-    return {"kind": kind, "shape": list(array.shape), "data": base64.b64encode(array.tobytes()).decode()}
+class Levels(NamedTuple):
+    """An array kept as two bytes a value: 65535 levels over its range, NaN kept; half a level off at most.
 
-
-def packed_levels(values):
-    """An array as two bytes a value: 65535 levels over its range, NaN kept; half a level off at most.
-
-    values : float array;  returns {kind, shape, data, low, step}: value = low + step times the number, 65535 is NaN.
+    low, step : value = low + step times the number (u2), 65535 is NaN.
     """
+
+    numbers: np.ndarray
+    low: float
+    step: float
+
+    def values(self):
+        """The array again, float64."""
+        return np.where(self.numbers == 65535, np.nan, self.low + self.step * self.numbers)
+
+
+def levels(values):
+    """A float array of any shape as :class:`Levels`."""
     values = np.asarray(values, float)
     known = np.isfinite(values)
     low, high = (float(values[known].min()), float(values[known].max())) if known.any() else (0.0, 0.0)
     step = (high - low) / 65534 or 1.0
-    levels = np.where(known, np.rint((np.where(known, values, low) - low) / step), 65535)
-    return {**packed(levels, "u2"), "low": low, "step": step}
+    numbers = np.where(known, np.rint((np.where(known, values, low) - low) / step), 65535)
+    return Levels(numbers.astype("u2"), low, step)
 
 
-def unpacked(entry):
-    """The array that :func:`packed` or :func:`packed_levels` made a text of."""
-    array = np.frombuffer(base64.b64decode(entry["data"]), dtype=f"<{entry['kind']}").reshape(entry["shape"])
-    return array if "step" not in entry else np.where(array == 65535, np.nan, entry["low"] + entry["step"] * array)
+def packed(data):
+    """What JSON can hold, arrays and :class:`Levels` as one text of base64 over deflate.
+
+    Behind the length of the JSON (4 bytes) and the JSON itself stand the bytes of the arrays, little-endian; each is
+    {kind, shape, at} in the JSON, and low and step for levels. Floats are rounded to f4, integers keep their kind.
+    """
+    parts, size = [], 0
+
+    def stored(value):
+        nonlocal size
+        if not isinstance(value, np.ndarray):
+            raise TypeError(f"page: arrays and JSON only, got {type(value).__name__}")
+        kind = f"u{value.dtype.itemsize}" if value.dtype.kind == "u" else "f4"
+        content = np.ascontiguousarray(value, dtype=f"<{kind}").tobytes()
+        entry = {"kind": kind, "shape": list(value.shape), "at": size}
+        parts.append(content + bytes(-len(content) % ALIGNMENT))
+        size += len(parts[-1])
+        return entry
+
+    def plain(value):
+        if isinstance(value, Levels):
+            return {**stored(value.numbers), "low": value.low, "step": value.step}
+        if isinstance(value, dict):
+            return {key: plain(part) for key, part in value.items()}
+        return [plain(part) for part in value] if isinstance(value, list | tuple) else value
+
+    head = json.dumps(plain(data), separators=(",", ":"), allow_nan=False, default=stored).encode()
+    head += b" " * (-len(head) % ALIGNMENT)
+    return base64.b64encode(zlib.compress(struct.pack("<I", len(head)) + head + b"".join(parts), 9)).decode()
 
 
 def quantised(values, low, high, kind="u1"):

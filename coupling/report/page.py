@@ -1,20 +1,22 @@
-"""A report as one file: of a run or of a study, told apart by what lies in the folder, put together and written."""
+"""A report as one file, of a run or of a study, told apart by what lies in the folder: made from `templates/page.html`.
+
+Charts are drawn by Apache ECharts, which is part of the page as its numbers are: it opens offline.
+"""
 
 from __future__ import annotations
 
 import contextlib
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from coupling.datasets import run_file
 from coupling.files.folder import REPORT_FILE, RUN_FILE
 from coupling.files.replace import replace_file
 from coupling.refused import Refused
-from coupling.report.frame import document
-from structure.response import SHOWN
 
-QUANTITIES = {name: (shown.unit, shown.scale) for name, shown in SHOWN.items()}
 MARK = '<meta name="generator" content="gushing report">'
+SCRIPTS = ("data.js", "charts.js", "ground.js", "tables.js", "player.js")
 
 
 def write_report(path: str | Path, out: str | Path | None = None, model: str | None = None) -> Path:
@@ -46,24 +48,57 @@ def write_report(path: str | Path, out: str | Path | None = None, model: str | N
     """
     folder = study_folder(path)
     if folder is None:
-        from coupling.report import run_markup, run_page
+        from coupling.report import run_page
 
         target = _checked_path(run_file(path).parent, out)
-        data, parts, scripts = run_page.collect(path, model), run_markup.parts, run_page.SCRIPTS
+        shown = run_page.collect(path, model)
     else:
-        from coupling.report import study_markup, study_page
+        from coupling.report import study_page
 
         target = _checked_path(folder, out)
-        data, parts, scripts = study_page.collect(folder, target.parent, model), study_markup.parts, study_page.SCRIPTS
-    text = document(
-        *parts(data),
-        data["player"] | {"quantities": QUANTITIES},
-        _file("page.css"),
-        "\n".join(map(_file, scripts)),
-        MARK,
-    )
-    replace_file(target, text)
+        shown = study_page.collect(folder, target.parent, model)
+    replace_file(target, rendered(shown))
     return target
+
+
+def rendered(shown: dict[str, Any]) -> str:
+    """The page as HTML.
+
+    shown : dict from :func:`coupling.report.run_page.collect` or :func:`coupling.report.study_page.collect`.
+    """
+    import jinja2
+    from markupsafe import Markup
+
+    from coupling.report.charts import COLUMNS, JOINT_COLUMNS, charts_of
+    from coupling.report.numbers import shown as as_read
+    from coupling.report.numbers import shown_error
+    from coupling.report.packing import packed
+    from coupling.studies.design import value_text
+
+    def worded(value):
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        return as_read(value) if number or value is None else value_text(value)
+
+    def source(name):
+        return Markup((resources.files("coupling.report") / "templates" / name).read_text(encoding="utf-8"))
+
+    entries = shown["player"]["entries"]
+    charts, answers = charts_of(entries), [one["models"] for one in entries]
+    player = shown["player"] | {
+        "charts": [chart._asdict() for group in charts.values() for chart in group],
+        "columns": COLUMNS,
+        "joint_columns": JOINT_COLUMNS,
+    }
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("coupling.report"), autoescape=True, trim_blocks=True, lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )  # fmt: skip
+    environment.filters |= {"shown": as_read, "shown_error": shown_error, "worded": worded}
+    return environment.get_template("page.html").render(
+        **shown, mark=Markup(MARK), source=source, scripts=SCRIPTS, charts=charts, packed=packed(player),
+        models=[model["name"] for model in max(answers, key=len, default=[])],
+        with_joints=any(model["joints"] for models in answers for model in models),
+    )  # fmt: skip
 
 
 def write_run_reports(folder: str | Path) -> list[Path]:
@@ -125,8 +160,4 @@ def is_report(path: str | Path) -> bool:
         return MARK.encode() in stream.read(1000)
 
 
-def _file(name):
-    return (resources.files("coupling.report") / name).read_text(encoding="utf-8")
-
-
-__all__ = ["is_report", "study_folder", "write_report", "write_run_reports"]
+__all__ = ["is_report", "rendered", "study_folder", "write_report", "write_run_reports"]

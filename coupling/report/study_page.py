@@ -3,36 +3,32 @@
 import os
 from pathlib import Path
 
+from coupling.datasets import RunFileError, read_attributes
 from coupling.datasets.group import read_group_at_once
-from coupling.files.folder import LOG_FILE, REPORT_FILE
+from coupling.files.folder import LOG_FILE, REPORT_FILE, RUN_FILE
+from coupling.postprocess.quality import ERRORS
 from coupling.refused import Refused
-from coupling.report.packing import evenly, packed
-from coupling.report.study_numbers import NOT_RUN, balances, case_numbers, case_warnings, last_record, run_facts
-from coupling.report.study_series import (
-    MOST_CASES,
-    MOST_RECORDS,
-    budget,
-    case_series,
-    ring_extremes_over_mass,
-    slider_stops,
-)
+from coupling.report.charts import COLUMNS
+from coupling.report.curves import MOST_IN_DETAIL, budget, entry, ring_series, rows_at, shape_of_ring, slider_stops
+from coupling.report.numbers import Number, finite, ring_numbers, shown
+from coupling.report.packing import evenly
+from coupling.report.trust import balances, case_warnings, last_record
+from coupling.runs.progress_line import duration
 from coupling.scenes.features import facts
 from coupling.studies.case import RUN_FOLDER
 from coupling.studies.collect import stored_cases, unreadable
-from coupling.studies.design import Range, StudyError, value_text
+from coupling.studies.design import Range, StudyError, short_names, value_text
 from coupling.studies.execute import case_file
 from structure.lining import at_whole_degrees
 from structure.models import model_name
 
-SCRIPTS = (
-    "unpack.js", "charts.js", "tables.js", "slider.js", "study_data.js", "study_charts.js", "study_tables.js",
-    "study_player.js",
-)  # fmt: skip
 MOST_VALUES_NAMED = 6  # of a fact that differs between the cases
+MOST_CASES, MOST_RECORDS, MOST_WARNINGS = 60, 121, 6
+NOT_RUN = "not run yet; repeat `gush study`"
 
 
 def collect(folder, beside, model=None):
-    """Everything that the page shows.
+    """Everything that the page shows, names as `page.html` uses them.
 
     Parameters
     ----------
@@ -43,72 +39,88 @@ def collect(folder, beside, model=None):
     model : str, optional
         Lining model whose numbers lead; left out: the study's first.
 
-    Returns
-    -------
-    dict
-        name, attributes; design, facts: rows of (what, text); cases: list of dicts of number, label, parameters,
-        status, message, numbers, balances, warnings, cpu_seconds, wall_seconds, run (path), report, log (links or
-        None), drawn; notes; player: what the script draws, JSON, its `cases` empty where none is finished.
-
     Raises
     ------
     coupling.studies.design.StudyError
         The definition, a scene of it, or what a case left cannot be read.
     """
     plan, found, failures = stored_cases(folder)
-    done = [case for case in found if case_file(Path(folder), case).is_file()]
     models = [model_name(backend) for backend in plan.backends]
     if model is not None:
         if model not in models:
             raise Refused(f"--model: must be one of the study, got {model!r}; there are {', '.join(models) or 'none'}")
         models.insert(0, models.pop(models.index(model)))
-    rows, whole, extremes = [], {}, {}
-    for case in found:
-        one, file = None, case_file(Path(folder), case)
-        if case in done:
-            one = whole[case.index] = _loaded(file, models)
-            extremes[case.index] = ring_extremes_over_mass(one)
-        rows.append(_row(case, one, extremes.get(case.index), failures.get(case.key), file.parent, Path(beside)))
-    drawn = [case for case in done if last_record(whole[case.index]) is not None]
+    files = {case.index: case_file(Path(folder), case) for case in found}
+    whole = {case.index: _loaded(files[case.index], models) for case in found if files[case.index].is_file()}
+    answers = {number: ring_series(states) for number, states in whole.items()}
+    rows = [_row(case, whole.get(case.index), answers.get(case.index), failures.get(case.key),
+                 files[case.index].parent, Path(beside)) for case in found]  # fmt: skip
+    done, lost = ([row for row in rows if (row["status"] == "finished") == good] for good in (True, False))
+    drawn = [case for case in found if case.index in whole and last_record(whole[case.index]) is not None]
     chosen = [drawn[k] for k in evenly(len(drawn), MOST_CASES)] if drawn else []
-    for row in rows:
-        row["drawn"] = row["number"] in {case.index for case in chosen}
-    kept = evenly(plan.records, MOST_RECORDS)
-    shown = {case.index: whole[case.index].isel(progress=kept) for case in chosen}
-    extremes = {k: [{key: v[kept] for key, v in model.items()} for model in extremes[k]] for k in shown}
-    # of a case with a ring, if there is one
-    widest = max(shown.values(), key=lambda one: one.sizes.get("model", 0), default=None)
-    step, records = (1, kept) if widest is None else budget(widest, len(chosen))
+    player, notes = _player(whole, answers, chosen, plan.records)
+    attributes = next(iter(whole.values())).attrs if whole else {}
+    if len(chosen) < len(drawn):
+        notes.insert(0, f"Charts hold {len(chosen)} of {len(drawn)} finished cases, evenly chosen; tables hold all.")
     return {
-        "name": plan.name,
-        "attributes": next(iter(whole.values())).attrs if whole else {},
-        "design": _design(plan, found, done, sum(row["status"] == "failed" for row in rows)),
-        "facts": _shared_facts(found),
-        "cases": rows,
-        "notes": _thinned(plan.records, step, len(records), len(chosen), len(drawn)),
-        "player": _player(widest, shown, extremes, chosen, rows, step, records),
-    }
+        "title": f"Gushing into a tunnel: study {plan.name}",
+        "lead": f"{len(rows)} cases over {', '.join({n: None for row in rows for n in row['parameters']})}, computed "
+                f"in {duration(sum(row['cpu_seconds'] or 0.0 for row in done))} of processor time.",
+        "status": ("finished" if not lost else "failed" if not done else "partly",
+                   f"{len(done)} of {len(rows)} finished"),
+        "warnings": _warnings(rows, lost),
+        "notes": notes,
+        "attributes": attributes,
+        "made": f"first case of {attributes['created']}" if "created" in attributes else "",
+        "design": _design(plan, found, len(done), sum(row["status"] == "failed" for row in lost)),
+        "scene_of_cases": _shared_facts(found),
+        "lost": lost,
+        "done": done,
+        "table": _table(done),
+        "trust": _trust(done),
+        "player": player,
+    }  # fmt: skip
 
 
-def _player(dataset, whole, extremes, chosen, rows, step, records):
+def _player(whole, answers, chosen, available):
+    """What the script draws, and what of it is left out as sentences."""
     if not chosen:
-        return {"cases": []}
-    labels = {row["number"]: row["label"] for row in rows}
+        return {"entries": [], "fields": None, "mesh": None}, []
+    states = {case.index: whole[case.index] for case in chosen}
+    # of a case with a ring, if there is one
+    widest = max(states.values(), key=lambda one: one.sizes.get("model", 0))
+    detail = len(chosen) <= MOST_IN_DETAIL
+    step, records = budget(widest, len(chosen), MOST_RECORDS, detail)
+    stops, notes = slider_stops(list(states.values()), records), []
+    if step > 1:
+        notes.append(f"Curves around the ring show every {step}. value; extremes are taken from all of them.")
+    if len(records) < available:
+        notes.append(f"Curves around the ring are shown at {len(records)} of {available} inflow masses.")
+    entries = [{
+        "number": case.index,
+        "label": case.name,
+        "gate": None if case.scene.gate is None else case.scene.gate.angle,
+        "at": rows_at(states[case.index], records, stops).tolist(),
+        **entry(states[case.index], answers[case.index], records, step, detail),
+    } for case in chosen]  # fmt: skip
+    told = [f"{shown(float(mass))} kg/m" for mass in stops]
     return {
-        "stops": packed(slider_stops([whole[case.index] for case in chosen], records)),
-        "records": records.tolist(),
-        "theta": dataset["theta"].values[::step].tolist(),
-        "models": [str(name) for name in dataset["model"].values] if "model" in dataset.dims else [],
-        "cases": [
-            {
-                "number": case.index,
-                "label": labels[case.index],
-                "gate": None if case.scene.gate is None else case.scene.gate.angle,
-                **case_series(whole[case.index], extremes[case.index], step, records),
-            }
-            for case in chosen
-        ],
-    }
+        "stops": {"along": "inflow_mass", "values": stops, "told": told},
+        "theta": widest["theta"].values[::step].tolist(),
+        "entries": entries,
+        "fields": None,
+        "mesh": None,
+    }, notes
+
+
+def _warnings(rows, lost):
+    warned = [f"Case {row['label']}: {text}" for row in rows for text in row["warnings"]]
+    if len(warned) > MOST_WARNINGS:
+        more = len(warned) - MOST_WARNINGS + 1
+        warned = [*warned[: MOST_WARNINGS - 1], f"{more} more are named in the table of balances and warnings."]
+    if lost:
+        warned.insert(0, f"Without a result: {len(lost)} of {len(rows)} cases; the reasons stand below the design.")
+    return warned
 
 
 def _loaded(file, models):
@@ -116,39 +128,73 @@ def _loaded(file, models):
     try:
         dataset = at_whole_degrees(read_group_at_once(file), "theta_ring")
         same = "model" not in dataset.dims or tuple(dataset["model"].values) == tuple(models)
-        return dataset if same else dataset.reindex(model=list(models))
+        return shape_of_ring(dataset if same else dataset.reindex(model=list(models)))
     except (OSError, RuntimeError, ValueError, KeyError, AttributeError) as error:
         raise StudyError(unreadable(file, error)) from None
 
 
-def _row(case, dataset, extremes, failure, folder, beside):
+def _row(case, states, answers, failure, folder, beside):
     run = folder / RUN_FOLDER
-    stored = run_facts(run)
-    if dataset is not None:
-        status, message = "finished", ""
-    elif failure is None:
-        status, message = "not run", NOT_RUN
-    else:
-        status, message = "failed", failure or "no reason was given"
+    status = "finished" if states is not None else "not run" if failure is None else "failed"
+    seconds = _wall_seconds(run)
+    there = {name: run / name for name in ("", REPORT_FILE, LOG_FILE) if (run / name).exists()}
     return {
         "number": case.index,
         "label": case.name,
         "parameters": case.parameters,
         "status": status,
-        "message": message,
-        "numbers": [] if dataset is None else case_numbers(dataset, extremes),
-        "balances": {} if dataset is None else balances(dataset),
-        "warnings": [] if dataset is None else case_warnings(dataset, case.scene),
-        "cpu_seconds": None if dataset is None else float(dataset["cpu_seconds"]),
-        "wall_seconds": float(stored["wall_seconds"]) if "wall_seconds" in stored else None,
-        "run": _relative(run, beside) if run.is_dir() else None,
-        "report": _relative(run / REPORT_FILE, beside) if (run / REPORT_FILE).is_file() else None,
-        "log": _relative(run / LOG_FILE, beside) if (run / LOG_FILE).is_file() else None,
+        "message": {"finished": "", "not run": NOT_RUN}.get(status, failure or "no reason was given"),
+        "numbers": [] if states is None else _numbers(states, answers),
+        "balances": {} if states is None else balances(states),
+        "warnings": [] if states is None else case_warnings(states, case.scene),
+        "cpu_seconds": None if states is None else float(states["cpu_seconds"]),
+        "wall_seconds": seconds,
+        "links": {name: Path(os.path.relpath(path, beside)).as_posix() for name, path in there.items()},
     }
 
 
-def _relative(path, beside):
-    return Path(os.path.relpath(path, beside)).as_posix()
+def _wall_seconds(run):
+    """What the file of a case's run says; None without a readable one."""
+    try:
+        stored = read_attributes(run) if (run / RUN_FILE).is_file() else {}
+    except RunFileError:
+        return None
+    return float(stored["wall_seconds"]) if "wall_seconds" in stored else None
+
+
+def _numbers(states, answers):
+    """Key numbers of a case at the last inflow mass that it reached."""
+    end = last_record(states)
+    if end is None:
+        return []
+    own = [Number(key, name, unit, factor, None, finite(states[key].values[end]), None, "")
+           for key, name, unit, factor, _ in COLUMNS if key in ("inflow_mass", "time", "flow_zone_area")
+           and key in states.variables]  # fmt: skip
+    return own + ring_numbers(list(states["model"].values) if "model" in states.dims else [], answers)
+
+
+def _table(done):
+    """Headings (name, unit) and rows of cells of the table of cases."""
+    known = {number.key for row in done for number in row["numbers"]}
+    left = ("joint_dislocation_max", "convergence_horizontal", "joint_rotation_max")
+    columns = [column for column in COLUMNS if column[0] in known and column[0] not in left]
+    parameters = list(dict.fromkeys(name for row in done for name in row["parameters"]))
+    heads = [(name, "") for name in short_names(parameters)] + [(name, unit) for _, name, unit, _, _ in columns]
+    rows = []
+    for row in done:
+        numbers = {number.key: number for number in row["numbers"]}
+        cells = [{"value": row["parameters"].get(name)} for name in parameters]
+        cells += [{"key": key, "number": numbers.get(key)} for key, *_ in columns]
+        rows.append((row, [*cells, *({"value": row[name]} for name in ("cpu_seconds", "wall_seconds")),
+                           {"value": len(row["warnings"])}]))  # fmt: skip
+    return {"heads": [*heads, ("processor time", "s"), ("wall time", "s"), ("warnings", "")], "rows": rows}
+
+
+def _trust(done):
+    """Names of the balances that any case has, and for each case their texts."""
+    names = [name for name in ERRORS if any(name in row["balances"] for row in done)]
+    cells = lambda row: [(row["balances"].get(n), ERRORS[n].form) for n in names]  # noqa: E731
+    return {"heads": [ERRORS[name].label for name in names], "rows": [(row, cells(row)) for row in done]}
 
 
 def _design(plan, found, done, failed):
@@ -169,9 +215,7 @@ def _design(plan, found, done, failed):
     rows += [(f"{name} (all cases)", value_text(value)) for name, value in plan.fixed.items()]
     rows.append(("lining models", ", ".join(plan.backends)))
     rows.append(("compared at", f"{plan.records} inflow masses of every case"))
-    rows.append(
-        ("cases", f"{len(found)}; {len(done)} finished, {failed} failed, {len(found) - len(done) - failed} not run")
-    )
+    rows.append(("cases", f"{len(found)}; {done} finished, {failed} failed, {len(found) - done - failed} not run"))
     return rows
 
 
@@ -181,25 +225,14 @@ def _shared_facts(found):
     for case in found:
         for what, text in facts(case.scene):
             rows.setdefault(what, []).append(text)
-    shown = []
+    told = []
     for what, texts in rows.items():
         different = list(dict.fromkeys(texts))
         everywhere = len(texts) == len(found)
         if len(different) == 1:
-            shown.append((what, different[0] if everywhere else f"{different[0]} (in {len(texts)} cases)"))
+            told.append((what, different[0] if everywhere else f"{different[0]} (in {len(texts)} cases)"))
         elif len(different) <= MOST_VALUES_NAMED:
-            shown.append((what, " | ".join(different)))
+            told.append((what, " | ".join(different)))
         else:
-            shown.append((what, f"{len(different)} different ones, the first: {different[0]}"))
-    return shown
-
-
-def _thinned(whole, step, records, chosen, drawn):
-    told = []
-    if chosen < drawn:
-        told.append(f"Charts hold {chosen} of {drawn} finished cases, evenly chosen; the tables hold them all.")
-    if step > 1:
-        told.append(f"Curves around the ring show every {step}. value; extremes are taken from all of them.")
-    if drawn and records < whole:
-        told.append(f"Curves around the ring are shown at {records} of {whole} inflow masses.")
+            told.append((what, f"{len(different)} different ones, the first: {different[0]}"))
     return told

@@ -1,25 +1,27 @@
 """Whether a scene fits into the memory that is free."""
 
-import contextlib
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import psutil
 
 from coupling.refused import Refused
-from mpm.scene import Scene as MpmScene
+
+if TYPE_CHECKING:
+    from mpm.scene import Scene as MpmScene
 
 
 def check_memory(mpm_scene: MpmScene) -> None:
     """Refuse a scene whose mesh and points would not fit into the memory that is free."""
     free, need = free_memory_bytes(), mpm_scene.estimated_bytes
-    if free is not None and need > 0.8 * free:
+    if need > 0.8 * free:
         raise Refused(
             f"discretisation: about {mpm_scene.estimated_elements:.2g} elements need about {need / 1e9:.1f} GB, "
             f"{free / 1e9:.1f} GB of memory are free; raise element_size, element_size_lining or size_growth"
         )
 
 
-def free_memory_bytes() -> int | None:
-    """Memory that a new process can use without swapping; None where the system does not tell."""
-    with contextlib.suppress(OSError, ValueError), open("/proc/meminfo", encoding="ascii") as lines:
-        for line in lines:
-            if line.startswith("MemAvailable:"):
-                return int(line.split()[1]) * 1024
-    return None
+def free_memory_bytes() -> int:
+    """Memory that a new process can use without swapping."""
+    return psutil.virtual_memory().available

@@ -1,9 +1,9 @@
 """Modified Cam Clay: clay that gets denser and stronger under load, and softens where it was loaded more before.
 
 Yield surface q^2 / M^2 + p (p - p_c) = 0 with p and p_c measured from the attraction, associated flow, and in the plane
-of specific volume v and ln p lines of slope lambda (yielding) and kappa (elastic). Elastic bulk modulus v p / kappa with
-a constant Poisson's ratio; M does not depend on the Lode angle. Backward Euler: the elastic law and the hardening are
-integrated exactly over the plastic volume strain of a step, whose value follows from two nested Newton iterations.
+of specific volume v and ln p lines of slope lambda (yielding) and kappa (elastic). Elastic bulk modulus v p / kappa
+with a constant Poisson's ratio; M does not depend on the Lode angle. Backward Euler: the elastic law and the
+hardening are integrated exactly over the plastic volume strain of a step, which two nested Newton iterations find.
 
 Source: Roscoe & Burland (1968), On the generalised stress-strain behaviour of wet clay; Borja & Lee (1990), Cam-Clay
 plasticity, part I: implicit integration of elasto-plastic constitutive relations.
@@ -23,10 +23,10 @@ TOLERANCE = 1e-11  # of the yield function, over the product of the two pressure
 
 
 def plastic_volume(multiplier, start, p_trial, p_c, elastic, plastic):
-    """Plastic volume strain y = multiplier (2 p - p_c) that belongs to a plastic multiplier [1/Pa], compression positive.
+    """Plastic volume strain y = multiplier (2 p - p_c) of a plastic multiplier [1/Pa], compression positive.
 
-    p = p_trial exp(-elastic y) and p_c = p_c exp(plastic y): y grows with what it is compared with, so one root. `start`
-    is a guess. Returns y, p, p_c and the derivative of y by the multiplier.
+    p = p_trial exp(-elastic y) and p_c = p_c exp(plastic y): y grows with what it is compared with, so there is one
+    root. `start` is a guess. Returns y, p, p_c and the derivative of y by the multiplier.
     """
     y = start
     p = hardened = slope = 0.0
@@ -182,8 +182,10 @@ class ModifiedCamClay(Soil):
         bulk = (p - p_trial) / strain.expansion if abs(strain.expansion) > 1e-9 else elastic * p
         shear = soil.shear_over_bulk * bulk
         mean, held = strain.expansion * third, p - soil.attraction
-        sxx, syy = stress.xx + held + 2.0 * shear * (strain.xx - mean), stress.yy + held + 2.0 * shear * (strain.yy - mean)
-        szz, sxy = stress.zz + held - 2.0 * shear * mean, stress.xy + 2.0 * shear * strain.xy
+        sxx = stress.xx + held + 2.0 * shear * (strain.xx - mean)
+        syy = stress.yy + held + 2.0 * shear * (strain.yy - mean)
+        szz = stress.zz + held - 2.0 * shear * mean
+        sxy = stress.xy + 2.0 * shear * strain.xy
         q = math.sqrt(1.5 * (sxx * sxx + syy * syy + szz * szz + 2.0 * sxy * sxy))
         p_c, slope, share = point.preconsolidation_pressure, soil.critical_state_slope, 1.0
         if q * q > slope * slope * p_trial * (p_c - p_trial):

@@ -1,7 +1,7 @@
 """Mohr-Coulomb soil whose cohesion, friction and dilatancy change with plastic strain, from a peak to a residual.
 
-Strength is linear in the accumulated equivalent plastic deviatoric strain and constant beyond `softening_strain`; it may
-as well grow (hardening). The return to the surface is that of `mpm.laws.mohr_coulomb`, with the strength at the
+Strength is linear in the accumulated equivalent plastic deviatoric strain and constant beyond `softening_strain`; it
+may as well grow (hardening). The return to the surface is that of `mpm.laws.mohr_coulomb`, with the strength at the
 beginning of the step. Softening ground fails in bands as wide as elements are small, unless a `relaxation_time` gives
 them a width.
 

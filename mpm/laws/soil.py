@@ -140,7 +140,8 @@ class Soil(Part):
 
         `k0` where it is given. Left out, it is that of an elastic body which gravity loads without lateral strain,
         nu / (1 - nu), raised to the lowest one that the law bears: of Mohr-Coulomb soil the active coefficient,
-        sigma_h >= (sigma_v (1 - sin(phi)) - 2 c cos(phi)) / (1 + sin(phi)). The passive side is never reached: nu < 0.5.
+        sigma_h >= (sigma_v (1 - sin(phi)) - 2 c cos(phi)) / (1 + sin(phi)). The passive side is never reached, since
+        nu < 0.5.
 
         Parameters
         ----------

@@ -1,7 +1,7 @@
 """Long steps in compiled code: all their substeps, pass by pass, by threads that meet between the passes.
 
-Every thread calls the same kernel and shares the passes with the others (`mpm.machine.team`). The parts are those of the
-mesh, whatever the number of threads, and so are the bits.
+Every thread calls the same kernel and shares the passes with the others (`mpm.machine.team`). The parts are those of
+the mesh, whatever the number of threads, and so are the bits.
 """
 
 from functools import cache

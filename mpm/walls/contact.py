@@ -19,7 +19,7 @@ SOLID_HELD, SOLID_STICKS, LIQUID_HELD = 1, 2, 4
 
 
 class Masses(NamedTuple):
-    """Of a node [kg/m]: what moves with the first velocity, water as if it filled all, pore water; and drag times dt."""
+    """Of a node [kg/m]: what has the first velocity, water as if it filled all, pore water; and drag times dt."""
 
     solid: float
     liquid: float
@@ -37,7 +37,7 @@ class Pair(NamedTuple):
 
 
 class Reaction(NamedTuple):
-    """Of a wall in a step [N s/m]: normal on grains and on water, shear along (normal_y, -normal_x); constraint bits."""
+    """Of a wall in a step [N s/m]: normal on grains and water, shear along (normal_y, -normal_x); constraint bits."""
 
     soil: float
     water: float

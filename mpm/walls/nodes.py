@@ -17,8 +17,8 @@ def contact_nodes(scene, mesh):
     -------
     SimpleNamespace
         node: (n_contact,) int; closed, open: (n_contact,) records of `mpm.fields.CONTACT`, with the gate shut and
-        open; lining: a SimpleNamespace for each tunnel with theta [deg], arc [m], rows of the contact arrays, factors of
-        their impulses, and whether they bear with the gate open; moved_by: rows that move with each tunnel's lining.
+        open; lining: a SimpleNamespace for each tunnel with theta [deg], arc [m], rows of the contact arrays, factors
+        of their impulses, and whether they bear with the gate open; moved_by: rows that move with each tunnel's lining.
     """
     node, closed, opened, active_closed, active_open, friction = [], [], [], [], [], []
     lining = []

@@ -1,34 +1,32 @@
 """The page about a run in a real browser: its numbers are the datasets', one slider moves all, anybody can use it."""
 
-import re
-
 import numpy as np
 import pytest
 from browser import find_browser
-from page_in_browser import CONTRAST, choose, number, show_frame, spoken, wider_than_the_screen, written_as
+from page_in_browser import (
+    CONTRAST,
+    STATE,
+    choose,
+    drawn,
+    number,
+    show_frame,
+    spoken,
+    wider_than_the_screen,
+    written_as,
+)  # fmt: skip
 
 import coupling
 from coupling import datasets
 from coupling.files.provenance import root_attributes
-from coupling.report import page, series
+from coupling.report import page
+from coupling.report.curves import JOINTS
+from structure.response import FORCES, PRESSURES
 from verification.synthetic_run import record, write_run
 
-pytestmark = pytest.mark.slow
-
-pytestmark = pytest.mark.skipif(
-    find_browser() is None, reason="no Chromium on this machine; Debian: apt-get install chromium-headless-shell"
-)
-
-# Name of every chart to what it shows, and the text of both tables.
-STATE = """Object.fromEntries([...document.querySelectorAll('[data-chart]')].map(f => [f.dataset.chart,
-  f.querySelector('canvas') ? f.querySelector('canvas').toDataURL() : f.querySelector('svg').innerHTML])
-  .concat(['joint-table', 'model-table', 'now'].map(id => [id, document.getElementById(id).innerText])))"""
-# Of an unrolled chart: [text, place] of the ticks of both axes, and the paths of its curves.
-CURVES = """(svg => {
-  const tick = (name, at) => [...svg.querySelectorAll(name)].map(t => [t.textContent, Number(t.getAttribute(at))]);
-  const paths = [...svg.querySelectorAll('path.initial, path.line')].map(p => p.getAttribute('d'));
-  return [tick('.x-tick', 'x'), tick('.y-tick', 'y'), paths];
-})"""
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(find_browser() is None, reason="no Chromium; Debian: apt-get install chromium-headless-shell"),
+]
 
 
 @pytest.fixture(scope="module")
@@ -84,11 +82,9 @@ def test_the_slider_moves_every_chart_and_both_tables(opened):
     for frame in (0, 2, 4):
         show_frame(opened, frame)
         seen.append(opened.evaluate(STATE))
-    fixed = {"section", "mesh"}
-    moving = set(seen[0]) - fixed
-    assert {"fields", "inflow_mass", "zones", "soil_pressure", "water_pressure", "soil_shear", "axial_force",
-            "shear_force", "bending_moment", "deformed", "convergence"} <= moving  # fmt: skip
-    assert {name for name in moving if len({s[name] for s in seen}) < 3} == set()
+    assert {"ground", "inflow_mass", "flow_zone", "disturbed_zone", *PRESSURES, *FORCES, "deformation",
+            "convergence_vertical", "settlement", "joint-table", "now-table"} <= set(seen[0])  # fmt: skip
+    assert {name for name in seen[0] if len({s[name] for s in seen}) < 3} == set()
 
 
 @pytest.mark.parametrize("frame", [0, 3, 4])
@@ -103,50 +99,68 @@ def test_joint_and_model_tables_show_the_record_of_the_slider(opened, tree, fram
     assert len(rows) == 12
     for joint, model, cells in rows:
         response = tree[datasets.structure_group(model)]
-        for (now, start), name, factor in zip(cells, series.JOINT_FIELDS, factors, strict=True):
+        for (now, change), name, factor in zip(cells, JOINTS, factors, strict=True):
             values = response[name].values[:, joint] * factor
-            assert (number(now), number(start)) == (written_as(values[frame]), written_as(values[0])), name
+            assert number(now) == written_as(values[frame]), name
+            # f4 in the page: 6e-8 of the values themselves
+            assert number(change.replace("+", "")) == pytest.approx(
+                values[frame] - values[0], rel=6e-3, abs=2e-7 * abs(values[frame])
+            )
     cells = opened.evaluate(
-        "[...document.querySelector('[data-row=\"bending moment M, largest\"]').querySelectorAll('td')]"
-        ".map(c => c.firstChild.data)"
+        "(k => [...document.querySelectorAll('#now-table tbody tr')].map(r => r.cells[k].firstChild.data))"
+        "([...document.querySelectorAll('#now-table thead th')].findIndex(h => h.innerText.startsWith('largest M')))"
     )
     beam, other = (
         tree[datasets.structure_group(m)]["bending_moment"][frame].max().item() / 1e3
         for m in ("beam-spring", "continuum")
     )
-    assert [number(c) for c in cells] == [
-        written_as(beam),
-        written_as(other),
-        pytest.approx(other - beam, rel=6e-3, abs=1e-4),
-    ]
+    apart = pytest.approx(other - beam, rel=6e-3, abs=1e-4)
+    assert [number(c) for c in cells] == [written_as(beam), written_as(other), apart]
 
 
-@pytest.mark.parametrize("frame", [0, 4])
-def test_unrolled_curves_lie_where_their_axes_say(opened, tree, frame):
-    choose(opened, "shape", "unrolled")
+@pytest.mark.parametrize(("frame", "shape"), [(0, "polar"), (4, "polar"), (4, "unrolled")])
+def test_drawn_curves_are_the_datasets(opened, tree, frame, shape):
+    choose(opened, "shape", shape)
     show_frame(opened, frame)
-    sources = {
-        "soil_pressure": [tree["lining"]] * 2,
-        "water_pressure": [tree["lining"]] * 2,
-        **{
-            name: [tree[datasets.structure_group(model)] for model in ("beam-spring", "beam-spring", "continuum")]
-            for name in ("axial_force", "shear_force", "bending_moment")
-        },
-    }
-    for name, expected in sources.items():
-        drawn = opened.evaluate(f"{CURVES}(document.getElementById('{name}'))")
-        x_axis, y_axis = (np.array([[number(text), at] for text, at in ticks]) for ticks in drawn[:2])
-        for k, (path, dataset) in enumerate(zip(drawn[2], expected, strict=True)):
-            xy = np.array(re.findall(r"[ML](-?[\d.]+) (-?[\d.]+)", path), float)
-            theta = np.interp(xy[:, 0], x_axis[:, 1], x_axis[:, 0])
-            # labels stand four units below their line
-            slope, offset = np.polyfit(y_axis[:, 1] - 4, y_axis[:, 0], 1)
-            values = dataset[name].values[0 if k == 0 else frame] / 1e3
-            np.testing.assert_allclose(theta, dataset["theta"], atol=0.02)
-            # coordinates have two decimals
-            np.testing.assert_allclose(
-                slope * xy[:, 1] + offset, values, atol=0.01 * abs(slope) + 1e-6 * np.abs(values).max()
-            )
+    models = [tree[datasets.structure_group(model)] for model in ("beam-spring", "continuum")]
+    sources = {"soil_pressure": [tree["lining"]], "water_pressure": [tree["lining"]], "axial_force": models,
+               "shear_force": models, "bending_moment": models}  # fmt: skip
+    for name, groups in sources.items():
+        for line, group, k in [("start", groups[0], 0), *((f"line{k}", g, frame) for k, g in enumerate(groups))]:
+            angle, value = drawn(opened, name, line)[:: -1 if shape == "polar" else 1]
+            np.testing.assert_array_equal(angle, [*group["theta"].values, 360])
+            expected = group[name].values[k] / 1e3
+            level = np.ptp(group[name].values) / 1e3 / 65534
+            np.testing.assert_allclose(value, [*expected, expected[0]], atol=1.01 * level)
+
+
+def test_a_click_on_a_chart_moves_the_slider_and_the_mouse_reads_the_ground(opened):
+    opened.evaluate("for (const name of ['beforeprint', 'afterprint']) dispatchEvent(new Event(name))")
+    place = opened.evaluate(
+        "(() => { const e = document.getElementById('inflow_mass'); e.scrollIntoView({block: 'center'});"
+        " const b = e.getBoundingClientRect(), [x, y] = echarts.getInstanceByDom(e)"
+        ".convertToPixel({gridIndex: 0}, [0.5, 100]); return [b.left + x, b.top + y]; })()"
+    )
+    for kind in ("mousePressed", "mouseReleased"):
+        opened.send("Input.dispatchMouseEvent", type=kind, x=place[0], y=place[1], button="left", clickCount=1)
+    assert opened.evaluate("document.getElementById('now').innerText") == "0.5 s, 150 kg/m"
+    assert drawn(opened, "inflow_mass", "cursor") == ((0.5, 0.5), (0, 300))
+    assert drawn(opened, "inflow_mass", "dots") == ((0.5,), (150,))
+    start = "echarts.getInstanceByDom(document.getElementById('inflow_mass')).getOption().dataZoom[0].start"
+    for modifiers, moved in ((0, False), (8, True)):  # the wheel alone scrolls the page, with Shift it looks closer
+        opened.send("Input.dispatchMouseEvent", type="mouseWheel", x=place[0], y=place[1], deltaX=0, deltaY=-200,
+                    modifiers=modifiers)  # fmt: skip
+        assert (opened.evaluate(start) > 0) is moved
+    choose(opened, "field", "pore_pressure")
+    place = opened.evaluate(
+        "(() => { const e = document.getElementById('ground'); e.scrollIntoView({block: 'center'});"
+        " const b = e.getBoundingClientRect(), [x, y] = echarts.getInstanceByDom(e)"
+        ".convertToPixel({gridIndex: 0}, [-6.4, -23.3]); return [b.left + x, b.top + y]; })()"
+    )
+    opened.send("Input.dispatchMouseEvent", type="mouseMoved", x=place[0], y=place[1])
+    told = opened.evaluate("document.getElementById('pointed').innerText")
+    # the synthetic points stand on a spiral, -9.81 kPa for each metre of height
+    assert number(told.split("m: ")[1].removesuffix(" kPa")) == pytest.approx(9.81 * 23.3, rel=0.03)
 
 
 def test_keys_and_button_move_the_slider(opened):
@@ -217,7 +231,7 @@ def test_runs_without_ring_or_with_one_record_or_two_tunnels_have_a_page(browser
     one = write_run(tmp_path / "one.nc", times=(0.0,), models=(), status="running")
     browser.open(page.write_report(one, tmp_path / "one.html"))
     assert "'interrupted'" in browser.evaluate("document.querySelector('.warnings').innerText")
-    assert browser.evaluate("document.querySelectorAll('#player [data-chart] > svg').length") == 5
+    assert browser.evaluate("document.querySelectorAll('#player .chart svg').length") == 7
     twin = coupling.load_scene("twin-tunnels")
     writer = datasets.RunWriter(tmp_path / "twin.nc", root_attributes(twin), twin)
     for time in (0.0, 1.0):
@@ -227,10 +241,8 @@ def test_runs_without_ring_or_with_one_record_or_two_tunnels_have_a_page(browser
         writer.append(made)
     writer.close("finished")
     browser.open(page.write_report(tmp_path / "twin.nc", tmp_path / "twin.html"))
-    curve = "document.querySelector('#soil_pressure path.line').getAttribute('d')"
-    curves = []
-    for tunnel in ("0", "1"):
-        choose(browser, "tunnel", tunnel)
-        curves.append(browser.evaluate(curve))
-    assert curves[0] != curves[1]
+    assert browser.evaluate("[...document.querySelectorAll('.case')].map(e => e.innerText)") == ["tunnel 0", "tunnel 1"]
+    browser.evaluate("document.getElementById('all').click()")
+    first, second = (drawn(browser, "soil_pressure", f"line{k}")[0] for k in (0, 1))
+    np.testing.assert_allclose(np.array(second) / first, 2.0, rtol=1e-3)
     assert browser.complaints == []

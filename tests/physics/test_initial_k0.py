@@ -11,7 +11,7 @@ import pytest
 
 import coupling
 import mpm
-from coupling.report.numbers import initial_theory
+from coupling.report.trust import initial_theory
 from coupling.runs.plan import rough_plan
 from coupling.scenes.features import features, initial_k0
 from mpm.fields import values

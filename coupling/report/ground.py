@@ -1,15 +1,16 @@
-"""Pictures that the page draws itself: points around the tunnel at some times, and the mesh."""
+"""Pictures of the ground that the page draws itself: points around the tunnel at some times, the mesh, a section."""
 
 import numpy as np
 
-from coupling.datasets.geometry import Tunnel, has_tunnels, tunnel_of
-from coupling.report.packing import BASE64, evenly, packed, quantised
+from coupling.datasets.geometry import Tunnel, gate_of, has_tunnels, tunnel_list, tunnel_of
+from coupling.report.packing import evenly, quantised
 
-BYTES_OF_FIELDS = 4.2e6  # base64 text of all snapshots
+BYTES_OF_FIELDS = 1.7e6  # of all snapshots, before they are compressed
 MOST_SNAPSHOTS = 12
-MOST_ELEMENTS = 60_000
+MOST_ELEMENTS = 30_000
 VIEW_RADII = 3.0  # half the width of the view, in outer radii
 COLOURS = 32
+NEIGHBOURS = 1.35  # how much larger points are drawn when some are left out
 
 
 def point_fields(points):
@@ -54,13 +55,13 @@ def field_snapshots(points, budget=BYTES_OF_FIELDS):
     points : xarray.Dataset
         `/points` of a run.
     budget : float
-        Bytes of base64 text at most.
+        Bytes at most.
 
     Returns
     -------
     dict or None
         view: {x, y, half} [m]; fields: name to {label, unit, low, high, log, colours}; snapshots: list of {time,
-        present, drawn, x, y, side, <field> ..}, packed: x and y as 65535ths of the view's width, side (of a square with
+        present, drawn, x, y, side, <field> ..}: x and y as 65535ths of the view's width, side (of a square with
         the point's area) as 255ths of `largest_side`, a field as 255ths of its range. None without snapshots.
     """
     if "x" not in points or not points.sizes.get("time"):
@@ -70,7 +71,7 @@ def field_snapshots(points, budget=BYTES_OF_FIELDS):
     near = [_near(points.isel(time=int(k)), view) for k in kept]
     fields = [point_fields(snapshot) for snapshot in near]
     scales = {name: _scale(name, [f[name] for f in fields]) for name in fields[0]}
-    most = int(budget / len(kept) / BASE64 / (5 + len(scales)))
+    most = int(budget / len(kept) / (5 + len(scales)))
     largest = max(float(np.sqrt(snapshot["volume"].max())) for snapshot in near)
     return {
         "view": view,
@@ -135,8 +136,8 @@ def scaled(values, scale):
 def _snapshot(near, fields, scales, view, largest, most):
     count = near.sizes["point"]
     drawn = evenly(count, most)
-    # fewer points are drawn larger, so that they still cover the ground
-    spread = np.sqrt(count / max(len(drawn), 1))
+    # fewer points are drawn larger, so that they still cover the ground, also where two neighbours are left out
+    spread = 1.0 if len(drawn) == count else NEIGHBOURS * np.sqrt(count / max(len(drawn), 1))
     left, bottom, width = view["x"] - view["half"], view["y"] - view["half"], 2 * view["half"]
     side = np.sqrt(near["volume"].values[drawn])
     return {
@@ -144,10 +145,10 @@ def _snapshot(near, fields, scales, view, largest, most):
         "present": count,
         "drawn": len(drawn),
         "spread": float(spread),
-        "x": packed(quantised(near["x"].values[drawn], left, left + width, "u2"), "u2"),
-        "y": packed(quantised(near["y"].values[drawn], bottom, bottom + width, "u2"), "u2"),
-        "side": packed(quantised(side, 0.0, largest), "u1"),
-        **{name: packed(scaled(fields[name]["values"][drawn], scale), "u1") for name, scale in scales.items()},
+        "x": quantised(near["x"].values[drawn], left, left + width, "u2"),
+        "y": quantised(near["y"].values[drawn], bottom, bottom + width, "u2"),
+        "side": quantised(side, 0.0, largest),
+        **{name: scaled(fields[name]["values"][drawn], scale) for name, scale in scales.items()},
     }
 
 
@@ -158,7 +159,7 @@ def mesh_picture(mesh):
     -------
     dict
         elements, nodes (count of all); min_altitude [m]; min_angle [degree]; x, y (n_nodes,), corners (n, 3), region
-        (n,) packed; whole: False where only triangles near the tunnel are kept.
+        (n,); whole: False where only triangles near the tunnel are kept.
     """
     x, y = mesh["x"].values, mesh["y"].values
     corners, region = mesh["element_nodes"].values, mesh["region"].values
@@ -172,10 +173,10 @@ def mesh_picture(mesh):
         "min_altitude": float(altitude.min()),
         "min_angle": float(angle.min()),
         "whole": whole,
-        "x": packed(x[used]),
-        "y": packed(y[used]),
-        "corners": packed(renumbered.reshape(-1, 3), "u4" if len(used) > 65535 else "u2"),
-        "region": packed(region[kept], "u1"),
+        "x": x[used],
+        "y": y[used],
+        "corners": renumbered.reshape(-1, 3).astype("u4" if len(used) > 65535 else "u2"),
+        "region": region[kept].astype("u1"),
     }
 
 
@@ -195,3 +196,28 @@ def _nearest_elements(mesh, corners):
     tunnel = tunnel_of(mesh) if has_tunnels(mesh) else Tunnel(0.0, 0.0, 0.0, 0.0)
     distance = tunnel.distance(mesh["x"].values[corners].mean(axis=1), mesh["y"].values[corners].mean(axis=1))
     return np.sort(np.argsort(distance, kind="stable")[:MOST_ELEMENTS])
+
+
+def section(scene, lining):
+    """What the page needs to draw the ground in section.
+
+    Parameters
+    ----------
+    scene : coupling.Scene or None
+    lining : xarray.Dataset
+        `/lining`, whose attributes are tunnels and gate.
+
+    Returns
+    -------
+    dict
+        tunnels: list of {x, y, outer, inner} [m]; gate: {tunnel, angle [degree], width [m]} or None; box: {width,
+        depth} or None; water_table: depth [m] or None; soils: list of {name, top}.
+    """
+    gate = gate_of(lining)
+    return {
+        "tunnels": [tunnel._asdict() for tunnel in (tunnel_list(lining) if has_tunnels(lining) else ())],
+        "gate": None if gate is None else gate._asdict(),
+        "box": None if scene is None else {"width": scene.box.width, "depth": scene.box.depth},
+        "water_table": None if scene is None or scene.water is None else scene.water.table_depth,
+        "soils": [] if scene is None else [{"name": s.name, "top": s.top_depth} for s in scene.soils],
+    }

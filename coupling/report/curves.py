@@ -1,0 +1,176 @@
+"""What the slider of a page moves: curves around a ring at some records, and what has one value over all records.
+
+A run and a case of a study come in the same form, a dataset over `progress`, `model` and `theta`, as
+:func:`coupling.studies.case.at_inflow_masses` gives it; each becomes one entry of the page.
+"""
+
+import numpy as np
+
+from coupling.datasets import structure_group
+from coupling.datasets.geometry import on_tunnel
+from coupling.datasets.tree import match_times, model_names
+from coupling.postprocess.extremes import extremes, ring_extremes
+from coupling.report.packing import evenly, levels
+from structure.lining import at_whole_degrees
+from structure.response import FORCES, PRESSURES
+
+MOTION = ("displacement_radial",)
+JOINTS = ("joint_axial_force", "joint_shear_force", "joint_bending_moment", "joint_opening", "joint_dislocation",
+          "joint_rotation")  # fmt: skip
+BYTES_OF_CURVES = 1.4e6  # of everything that has a value for each angle, before it is compressed
+BYTES_OF_VALUE = 2
+ANGLE_STEPS = (1, 2, 3, 4)  # take every so many values around the ring before leaving out records
+MOST_STOPS = 240
+MOST_IN_DETAIL = 4  # entries of a page that show displacements and joints, too
+
+
+def run_states(run, tunnel, records):
+    """States of a tunnel of a run at some records.
+
+    Parameters
+    ----------
+    run : xarray.DataTree
+    tunnel : int or None
+        None: that with the gate.
+    records : (n,) int
+        Of `/history`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Pressures (progress, theta), histories (progress), responses (progress, model, theta or joint), NaN where a
+        model has no record; time [s] and inflow_mass [kg/m] (progress).
+    """
+    import xarray as xr
+
+    history = run["history"].to_dataset().isel(time=records)
+    parts, times = [history[[n for n in history.data_vars if history[n].dims == ("time",)]]], history["time"].values
+    lining = run["lining"].to_dataset()
+    if "soil_pressure" in lining:
+        rows, _ = match_times(lining["time"].values, times)
+        parts.append(on_tunnel(lining[list(PRESSURES)].isel(time=rows), tunnel))
+    answers, names = [], model_names(run, tunnel)
+    for name in names:
+        response = run[structure_group(name, tunnel)].to_dataset()
+        rows, present = match_times(response["time"].values, times)
+        if present.any():
+            answer = at_whole_degrees(response).drop_vars("inflow_mass", errors="ignore").isel(time=rows)
+            answer = answer.assign_coords(time=times).where(xr.DataArray(present, dims="time"))
+            answers.append(answer.expand_dims(model=[name]))
+    if answers:
+        parts.append(xr.concat(answers, dim="model", join="outer", combine_attrs="override", data_vars="all"))
+    plain = [part.drop_vars(["time", "inflow_mass", "theta_bnds"], errors="ignore").drop_attrs() for part in parts]
+    states = xr.merge(plain, compat="override", join="outer").rename(time="progress")
+    mass = history["inflow_mass"].values
+    return shape_of_ring(states.assign(time=("progress", times)).assign_coords(inflow_mass=("progress", mass)))
+
+
+def shape_of_ring(states):
+    """The states with the radial displacement of the ring's shape alone: what moves as a whole does not deform."""
+    from coupling.figures.ring import centred
+
+    if "displacement_radial" not in states:
+        return states
+    radial, tangential = (states[f"displacement_{way}"].transpose(..., "theta") for way in ("radial", "tangential"))
+    shape, _ = centred(np.radians(states["theta"].values), radial.values, tangential.values)
+    return states.assign(displacement_radial=radial.copy(data=shape))
+
+
+def budget(states, count, most, detail):
+    """How `count` entries of a page are thinned to fit into it.
+
+    Parameters
+    ----------
+    states : xarray.Dataset
+        Of one of them.
+    count, most : int
+        Entries; records of each at most.
+    detail : bool
+        Whether they show displacements, too.
+
+    Returns
+    -------
+    int, (n,) int64
+        Every how many values around the ring are taken, and at which of the records.
+    """
+    records, of_model = states.sizes["progress"], len(FORCES) + len(MOTION) * detail
+    curves = (len(PRESSURES) + of_model * states.sizes.get("model", 0)) * states.sizes.get("theta", 1)
+    affordable = BYTES_OF_CURVES / (BYTES_OF_VALUE * curves * max(count, 1))  # records of whole curves
+    step = next((step for step in ANGLE_STEPS if affordable * step >= min(records, most)), ANGLE_STEPS[-1])
+    return step, evenly(records, max(2, min(most, int(affordable * step))))
+
+
+def slider_stops(entries, records):
+    """Inflow masses that the slider stops at: all that any entry has, ascending, (n,) float64 [kg/m]."""
+    masses = np.concatenate([states["inflow_mass"].values[records] for states in entries])
+    masses = np.unique(np.round(masses, 9))
+    masses = masses[np.isfinite(masses)]
+    return masses[evenly(len(masses), MOST_STOPS)]
+
+
+def rows_at(states, records, stops):
+    """Row of the curves at every stop of the slider: that of the nearest inflow mass, -1 beyond what was reached."""
+    masses = states["inflow_mass"].values
+    reached = int(np.flatnonzero(np.isfinite(states["time"].values))[-1])  # time is unknown beyond
+    rows = np.array([int(np.argmin(np.abs(masses[records] - stop))) for stop in stops])
+    beyond = (stops > masses[reached] * (1 + 1e-6)) & (records[rows] >= reached) | (records[rows] > reached)
+    return np.where(beyond, -1, rows)
+
+
+def entry(states, answers, records, step, detail):
+    """One run, tunnel or case as the page draws it.
+
+    Parameters
+    ----------
+    states : xarray.Dataset
+        From :func:`run_states` or of a case, in memory.
+    answers : list of dict
+        From :func:`ring_series`, one for each lining model.
+    records, step
+        From :func:`budget`.
+    detail : bool
+        Whether displacements and joints are kept.
+
+    Returns
+    -------
+    dict
+        records: of the curves' rows; series: name to (n_progress,); curves: name to levels (n_records, n_angles);
+        joint_angle [degree]; models: list of {name, series, curves, joints: name to (n_records, n_joints)}; all SI.
+    """
+    kept, series = states.isel(progress=records), [n for n in states.data_vars if states[n].dims == ("progress",)]
+    pressures = [name for name in PRESSURES if name in states]
+    of_pressures = extremes(states, pressures) if pressures else {}
+    models = []
+    for k, found in enumerate(answers):
+        model = kept.isel(model=k)
+        around = [name for name in (*FORCES, *(MOTION if detail else ())) if name in model]
+        joints = [name for name in JOINTS if detail and model.sizes.get("joint") and name in model]
+        models.append({
+            "name": str(model["model"].item()),
+            "series": found,
+            "curves": {name: levels(model[name].transpose("progress", ...).values[:, ::step]) for name in around},
+            "joints": {name: model[name].transpose("progress", ...).values for name in joints},
+        })  # fmt: skip
+    return {
+        "records": records.tolist(),
+        "series": {"inflow_mass": states["inflow_mass"].values, **{name: states[name].values for name in series},
+                   **{key: of_pressures[key].values for key in getattr(of_pressures, "data_vars", ())}},
+        "curves": {name: levels(kept[name].values[:, ::step]) for name in pressures},
+        "joint_angle": states["joint_angle"].values.tolist() if "joint_angle" in states.coords else [],
+        "models": models,
+    }  # fmt: skip
+
+
+def ring_series(states):
+    """What has one value at each record of every lining model's answer: list of dict, name to (n_progress,)."""
+    found = []
+    for k in range(states.sizes.get("model", 0)):
+        model = states.isel(model=k)
+        series = ring_extremes(model)
+        if "displacement_radial" in model:
+            shape = extremes(model, ("displacement_radial",)).data_vars
+            series |= {key: values.values for key, values in shape.items() if key != "inflow_mass"}
+        if model.sizes.get("joint"):
+            series["joint_dislocation_max"] = abs(model["joint_dislocation"]).max("joint").values
+        found.append(series | ({"settlement": model["settlement"].values} if "settlement" in model else {}))
+    return found
