@@ -108,11 +108,11 @@ class Measures:
         -------
         dict
             momentum_departure [N s/m]: what the points' momentum differs by from what the nodes received, the larger
-            component; water_missing [kg/m]: water at the start less that now; work_gravity, work_stress, work_drag,
-            kinetic_energy_change, transfer_loss [J/m]: energies since the start, the last what the way from points to
-            nodes and back (PIC, MUSL) took; contact_error [-]: change of the momentum at the lining that the recorded
-            reactions do not explain, over their sum; largest_courant [-]: time step over the critical one of the state
-            it led to; and the `flow_amounts` that these are compared with.
+            component; water_missing [kg/m]: water at the start less that now;
+            work_gravity, work_stress, work_drag, kinetic_energy_change, transfer_loss [J/m]: energies since the start,
+            the last what the way from points to nodes and back (PIC, MUSL) took; contact_error [-]: change of the
+            momentum at the lining that the recorded reactions do not explain, over their sum; largest_courant [-]: time
+            step over the critical one of the state it led to; and the `flow_amounts` that these are compared with.
         """
         ledger = {name: float(self.ledger[name].sum()) for name in self.ledger.dtype.names}
         now = self.sums_over_points()

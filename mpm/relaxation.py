@@ -160,7 +160,6 @@ def relax(solver, friction, tolerance, max_steps, progress=None):
     effective = values(force, ("force_x", "force_y"))
     held = values(mapped, ("force_x", "force_y")) - effective.sum(axis=0)
     held[:, 1] -= (mapped["mass_solid"] + mapped["mass_pore_liquid"]) * s.scene.gravity
-    held += walls.outside if len(walls.outside) else 0.0
     mass = fictitious_masses(s)
     reaction = np.zeros(s.n_contact, REACTION_RECORD)
     sums = np.zeros((s.parts, 3))

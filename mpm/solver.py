@@ -180,7 +180,6 @@ class Solver(Measures):
             two_phase=scene.is_two_phase,
             tied=self.levels.count > 1,
             moving=any(scene.lining_of(tunnel) != "fixed" for tunnel in scene.tunnels),
-            held_pressure=False,
             laws=laws_of(scene),
         )
         self._long_step = long_step_kernel(self.needs)
@@ -202,7 +201,6 @@ class Solver(Measures):
             records["normal_x"][on_mirror_line] = 0.0
         self.impulse = np.zeros(self.n_contact, REACTION_RECORD)
         self.moving, self.wall = None, np.zeros((self.n_contact, 2))
-        self.outside = np.zeros((0, 2))
         self.lining_displacement = self.lining_velocity = self.lining_impulse = np.zeros(0)
         if self.needs.moving:
             self.moving = moving = MovingLinings(scene, self.needs, mesh, self.contact_of_node, contact.moved_by)
@@ -414,7 +412,7 @@ class Solver(Measures):
                 self.contents, levels.nodes, levels.next_row, levels.of_row, self.nodes, self.tied_means, self.status,
                 self.touched, self.sums, self.momenta, *self._empty,
             ),
-            Walls(self.fixed, self.contact_of_node, self.contact, self.wall, self.impulse, self.outside),
+            Walls(self.fixed, self.contact_of_node, self.contact, self.wall, self.impulse),
             self._cuts, self.clock, self._pace, self.medium,
             Tally(
                 self._counts, self._measures, self._limits, self._suspended, self._bad, self._n_left,

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from coupling.refused import SceneError
+from mpm.laws.law import UnknownLaw, soil_law
 from structure.inputs import shortened
 
 # No scene is longer; a larger file is something else.
@@ -120,6 +121,15 @@ def changed(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     return merged
 
 
+def _for_law(soil: dict[str, Any], model: Any) -> dict[str, Any]:
+    """A soil of a base without what another law does not know; the rest is taken over."""
+    try:
+        known = soil_law(model).model_fields if isinstance(model, str) and model != soil.get("model") else soil
+    except UnknownLaw:  # told where the scene is validated
+        return soil
+    return {key: value for key, value in soil.items() if key in known}
+
+
 def _with_entries(name: str, entries: list[Any] | tuple[Any, ...], changes: dict[str, Any]) -> list[Any]:
     """A list in which the entries of some numbers, the keys of `changes`, are changed."""
     result = list(entries)
@@ -132,6 +142,8 @@ def _with_entries(name: str, entries: list[Any] | tuple[Any, ...], changes: dict
                 f"as in {name}.0"
             )
         here = result[number]
+        if name == "soils" and isinstance(here, dict) and isinstance(value, dict) and "model" in value:
+            here = _for_law(here, value["model"])
         result[number] = changed(here, value) if isinstance(here, dict) and isinstance(value, dict) else value
     return result
 

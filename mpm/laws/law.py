@@ -10,7 +10,6 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
-import numpy as np
 from pydantic_core import PydanticCustomError, ValidationError
 
 from mpm.laws.soil import Soil
@@ -95,8 +94,10 @@ def soil_of_its_law(given: Any, validate: Any) -> Soil:
         raise ValidationError.from_exception_data("Soil", [wrong]) from unknown
 
 
-def soil_table(scene: Any) -> np.ndarray:
+def soil_table(scene: Any) -> Any:
     """Numbers of the soils that the kernels read: (n_soils,) records of `COMMON` and the constants of their laws."""
+    import numpy as np  # reading a scene needs none
+
     rows = []
     for soil in scene.soils:
         drag = scene.gravity / soil.hydraulic_conductivity if scene.is_two_phase else 0.0

@@ -7,7 +7,6 @@ from mpm.machine.compile import inline_kernel, kernel_part
 from mpm.walls.contact import (
     FIXED_X,
     FIXED_Y,
-    HELD_PRESSURE,
     LIQUID_HELD,
     MIRROR_X,
     SOLID_HELD,
@@ -32,7 +31,7 @@ class Forces(NamedTuple):
 @cache
 def sum_kernel(needs):
     """Kernel `sum_of_node` for what a scene needs."""
-    wet, two_phase, held_pressure = needs.wet, needs.two_phase, needs.held_pressure
+    wet, two_phase = needs.wet, needs.two_phase
 
     @kernel_part
     def sum_of_node(i, dt, net, walls):
@@ -61,9 +60,6 @@ def sum_kernel(needs):
             r = net.next_row[r]
         if walls.fixed[i] & MIRROR_X:  # the mirror image's momentum is the opposite
             psx = plx = 0.0
-        if held_pressure:
-            fx, fy, flx, fly = fx + walls.outside[i, 0], fy + walls.outside[i, 1], flx + walls.outside[i, 0], fly
-            fly += walls.outside[i, 1]
         if wet and not two_phase:
             ms += mn  # grains and water move as one
         return Masses(ms, ml, mn, dt * drag), Pair(psx, psy, plx, ply), Forces(fx, fy, flx, fly)
@@ -277,12 +273,10 @@ def solve_kernel(needs):
 
 @inline_kernel
 def constrained(v, fixed):
-    """Velocities under the constraints of box and mirror line; held pressure lets the water through."""
+    """Velocities under the constraints of box and mirror line."""
     sx, sy, lx, ly = v
     if fixed & FIXED_X:
-        sx = 0.0
-        if not fixed & HELD_PRESSURE:
-            lx = 0.0
+        sx = lx = 0.0
     if fixed & FIXED_Y:
         sy = ly = 0.0
     return Pair(sx, sy, lx, ly)

@@ -19,7 +19,6 @@ class Needs(NamedTuple):
     two_phase: bool  # with a velocity of its own
     tied: bool  # levels of local time stepping
     moving: bool  # linings that move
-    held_pressure: bool  # water pressure held at a side (`mpm.walls.held_pressure`)
     laws: tuple[str, ...]  # names of the soils' laws
 
 
@@ -81,7 +80,6 @@ class Walls(NamedTuple):
     contact: np.ndarray  # (n_contact,) records
     velocity: np.ndarray  # (n_contact, 2) float64 of the lining [m/s]; read where linings move
     impulse: np.ndarray  # (n_contact,) records, added
-    outside: np.ndarray  # (n_nodes, 2) float64, force of a held pressure on mixture and water [N/m]; or (0, 2)
 
 
 class Medium(NamedTuple):

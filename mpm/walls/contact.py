@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from mpm.machine.compile import inline_kernel, kernel_part
 
-FIXED_X, FIXED_Y, MIRROR_X, HELD_PRESSURE = 1, 2, 4, 8
+FIXED_X, FIXED_Y, MIRROR_X = 1, 2, 4
 SOLID_HELD, SOLID_STICKS, LIQUID_HELD = 1, 2, 4
 
 

@@ -180,20 +180,20 @@ def test_wall_pushes_an_undrained_mixture_as_two_tied_phases():
             mixture = speed * (row["mass_solid"] + row["mass_pore_liquid"])
             block(given[0], "momentum_solid_x", "momentum_solid_y")[:] = mixture.T
         nodes, impulse, ledger = np.zeros(n, NODE_RECORD), np.zeros(n, REACTION_RECORD), np.zeros(1, LEDGER_RECORD)
-        still, nowhere = np.zeros((n, 2)), np.zeros((0, 2))
+        still = np.zeros((n, 2))
         system = System(**dict.fromkeys(System._fields) | {
             "net": Net(**dict.fromkeys(Net._fields) | {
                 "which_node": numbered, "next_row": np.full(n, -1, np.int32), "level_of_row": np.zeros(n, np.int8),
                 "touched": np.ones((1, n), np.uint8), "sums": given, "tied_means": np.zeros(0, TIED_RECORD),
                 "nodes": nodes, "status": np.zeros(n, np.int8),
             }),
-            "walls": Walls(np.zeros(n, np.int8), numbered, contact, still, impulse, nowhere),
+            "walls": Walls(np.zeros(n, np.int8), numbered, contact, still, impulse),
             "clock": Clock(**dict.fromkeys(Clock._fields) | {"dt_of_level": np.array([1e-3])}),
             "medium": Medium(9.81, 1000.0, 8e7),
             "tally": Tally(**dict.fromkeys(Tally._fields) | {"ledger": ledger}),
         })  # fmt: skip
         # a kernel's part has no code of its own to call
-        needs = Needs(True, two_phase, tied=False, moving=False, held_pressure=False, laws=("elastic",))
+        needs = Needs(True, two_phase, tied=False, moving=False, laws=("elastic",))
         numba.njit(error_model="numpy")(solve_kernel(needs).py_func)(0, n, 0, 0, system)
         assert ledger["unexplained"] < 1e-12 * ledger["reactions"]
         reactions = values(impulse, ("soil", "water", "shear")) / 1e-3

@@ -148,7 +148,7 @@ for name, title, direction, plane_strain in (
 def isotropic(cohesion=2e4, friction_angle=30.0, dilatancy_angle=10.0, tensile_strength=1e8, steps=40):
     """Expand all around beyond the apex or the tensile strength and press again: elastic, capped, elastic at once."""
     element = Element(cohesion, friction_angle, dilatancy_angle, tensile_strength)
-    cap, bulk = element.parameters[6], element.parameters[1]
+    _, bulk, (*_, cap), _ = element.parameters
     reach = 2 * (cap + CONFINEMENT) / (3 * bulk)  # twice the strain to the cap
 
     def run():

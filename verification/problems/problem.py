@@ -9,7 +9,8 @@ from typing import Any
 
 #: Modules of this package that register problems when they are imported.
 FAMILIES = (
-    "columns", "waves", "motion", "conservation", "plasticity", "flows", "earth_pressure", "cavities", "slots",
+    "columns", "waves", "motion", "conservation", "plasticity", "soil_laws", "flows", "earth_pressure", "cavities",
+    "slots",
 )  # fmt: skip
 
 #: Numerical choices that a problem hands through to its scene, and the values that its ladder goes through.
