@@ -10,6 +10,8 @@ COARSE = 2.0
 COMPARED, LAST = 1000.0, 2000.0
 OUTPUT = {"output.interval": 0.02, "output.snapshot_interval": 0.1}
 TOGETHER = ({"hydraulic_conductivity": 1e-5, "dilatancy_angle": 5.0}, {"hydraulic_conductivity": 1e-2, "dilatancy_angle": 5.0})
+#: The source's ring in the soil computation, one layer of linear triangles of 0.75 m: `linings.one_layer`.
+ONE_LAYER = {"lining": "elastic", "lining_modulus": 8.0 * 34.5e9}
 #: As near as our mesh comes to the source's, with its 0.2 m at a gate of 0.2 m.
 SOURCE_MESH = {"element_size": 0.75, "element_size_lining": 0.75, "element_size_interior": 0.2, "size_growth": 0.25,
                "elements_across_gate": 2}  # fmt: skip
@@ -42,7 +44,7 @@ def plans() -> list[dict]:
              "soils.0.hydraulic_conductivity": [1e-5, 1e-3, 1e-2], "soils.0.dilatancy_angle": [2.0, 5.0],
              "soils.0.loose_porosity": [0.5, 0.6], "gate.corners": ["slipping"],
              "discretisation": [{"elements_across_gate": 2}, {"elements_across_gate": 8}, SOURCE_MESH],
-             "lining": ["floating", "elastic"], "soils.0": list(TOGETHER)}},
+             "lining": ["floating", "elastic"], "soils.0": list(TOGETHER), "tunnels.0": [ONE_LAYER]}},
         {"name": "twin-unknowns", "design": "one-at-a-time", "scene": "twin-tunnels", "fixed": coarse,
          "parameters": {"gate.angle": [90.0], "soils.0.hydraulic_conductivity": [1e-2],
                         "soils.0.dilatancy_angle": [5.0]}},
