@@ -1,52 +1,42 @@
-"""The page that sets our numbers beside the published ones, statement by statement, with figures."""
+"""The page that sets our numbers beside the published ones: blocks that are computed, in a text that is written."""
 
 from __future__ import annotations
 
+import re
 from datetime import UTC, datetime
 from importlib import resources
 from pathlib import Path
 
 import numpy as np
 
-from verification.published.answers import gushing_answers, initial_answers, mirror_answers, twin_answers
-from verification.published.evidence import evidence, mirror_difference
-from verification.published.sources import at_study_inflow, case_runs, published_numbers, run_of_scene
+from verification.published.bands import Verdict, judged
+from verification.published.evidence import COMPARED, RunEvidence, at_rest, provenance
+from verification.published.statements import measured_case, measured_twin, published_numbers, statements
+from verification.published.unknowns import finished, moved_by, moved_by_rings, told
 
-CAPTIONS = {
-    "06": "settlement troughs by inflow mass, twin tunnels",
-    "07": "initial pressures against theory, twin tunnels",
-    "09": "inflow mass and flow zone over time, with its stages",
-    "10": "displacement, deviatoric strain, pore pressure, effective stress",
-    "11": "soil stress and pore pressure along both axes through the gate",
-    "12": "stress variation ratio",
-    "13": "pressures on the lining",
-    "14": "pressures over the initial ones",
-    "15": "axial force, shear force, bending moment",
-    "15-ring": "deformed ring",
-    "16": "extreme forces over inflow mass",
-    "17": "joint opening, dislocation, rotation over inflow mass",
-    "19": "pressure ratios across cases",
-    "20": "additional axial force across cases",
-    "21": "additional moment across cases",
-    "22": "deformation and displacement of the lining across cases",
-    "23": "joint deformation across cases",
-}
+#: Pictures that the page shows; all others are drawn beside them.
+SHOWN = ("bands", "06", "09", "10", "11", "13", "15", "23")
+#: What of a changed run is told: key of a statement, head of the column.
+COLUMNS = {"rate": "inflow kg/m/s", "soil gate": "soil at gate", "water gate": "water at gate", "crown": "crown %",
+           "invert": "invert %", "Q": "Q %", "M+": "M+ %", "M-": "M- %", "N": "N %", "influence_soil": "soil D",
+           "influence_water": "water D", "arch": "arch D"}  # fmt: skip
 
 
 def write_page(folder: str | Path, out: str | Path) -> dict:
-    """Draw the figures of what :func:`verification.published.run_all.run_all` has finished, and write study.md.
+    """Draw the figures of what `gush published` has finished, and write published.md.
 
     Parameters
     ----------
     folder : str or path
-        With the studies table-2, twin-and-mirror and sensitivity; what is absent is left out and named.
+        With the studies of :func:`verification.published.runs.plans`; what is absent is left out and named.
     out : str or path
-        Folder of study.md and its images/.
+        Folder of published.md and its images/published/.
 
     Returns
     -------
     dict
-        page: path; figures: number to path; answers: list of {statement, published, ours, agrees, rule}; missing: list.
+        page: path; figures: number to path; answers: list of {statement, published, ours, low, high, agrees, rule};
+        missing: list.
 
     Raises
     ------
@@ -55,174 +45,250 @@ def write_page(folder: str | Path, out: str | Path) -> dict:
     """
     from coupling.studies.collect import read_study
     from coupling.studies.design import StudyError
-    from verification.published.draw import draw_case, draw_cases, draw_twin
+    from verification.published.draw import draw_bands, draw_case, draw_cases, draw_twin
 
     folder, out = Path(folder), Path(out)
-    images = out / "images" / "study"
-    runs = case_runs(folder / "table-2")
-    run = run_of_scene(runs, "case-3")
-    if run is None:
-        raise StudyError(f"study '{folder / 'table-2'}': case 3 must be finished; run gush published --out {folder}")
-    beside = _optional(case_runs, folder / "twin-and-mirror") or []
-    twin_run, mirrored = run_of_scene(beside, "twin-tunnels"), run_of_scene(beside, "case-3", 270.0)
-    case, study = evidence(run), read_study(folder / "table-2").load()
-    twin = None if twin_run is None else evidence(twin_run)
-    sections = {"Initial state": initial_answers(case), "During gushing": gushing_answers(case)}
-    figures = draw_case(case, images)
-    missing = [f"case {k + 1}" for k, one in enumerate(runs) if one is None]
+    runs = {run.evidence.scene.name: run.evidence for run in finished(folder / "cases")}
+    if "case-3" not in runs:
+        raise StudyError(f"study '{folder / 'cases'}': case 3 must be finished; run gush published --out {folder}")
+    case, twin = (_bonded(runs[name], folder) if name in runs else None for name in ("case-3", "twin-tunnels"))
+    others = _by_scene(finished(folder / "meshes"), folder)
+    verdicts, rows = judge_case(case, others.get("case-3", {}), finished(folder / "unknowns"))
     if twin is not None:
-        sections["Twin tunnels"] = twin_answers(twin)
+        verdicts |= judge_twin(twin, others.get("twin-tunnels", {}), finished(folder / "twin-unknowns"))
+    study = read_study(folder / "cases").load()
+    images = out / "images" / "published"
+    figures = draw_bands(verdicts, images) | draw_case(case, images) | draw_cases(study, case.compared, images)
+    if twin is not None:
         figures |= draw_twin(twin, images)
-    else:
-        missing.append("twin tunnels")
-    if mirrored is not None:
-        from coupling.datasets import read_pressures
-
-        difference = mirror_difference(
-            case.of_gate, read_pressures(mirrored.folder), min(case.half, mirrored.last_mass)
-        )
-        sections["Mirror image"] = mirror_answers(difference)
-    else:
-        missing.append("case 3 mirrored")
-    figures |= draw_cases(study, case.half, images)
-    sensitivity = _optional(read_study, folder / "sensitivity")
-    if sensitivity is None:
-        missing.append("sensitivity")
-    lines = [
-        "# The published study, beside ours",
-        "",
-        f"Made by `gush published` on {datetime.now(UTC):%Y-%m-%d} {_provenance(run)}. Published: "
-        f"{published_numbers()['source']}; angles from the crown, clockwise; per metre of tunnel. Statements are "
-        f"made at {published_numbers()['gushing']['inflow_mass']:g} kg/m there and answered at {case.half:.0f} kg/m "
-        "here.",
-        "",
-    ]
-    if missing:
-        lines += [f"Not finished, so left out: {', '.join(missing)}.", ""]
-    lines += _verdict([answer for rows in sections.values() for answer in rows if answer.published != "(ours)"])
-    for title, rows in sections.items():
-        lines += [f"## {title}", "", "| statement | published | here | agrees | rule |", "|---|---|---|---|---|"]
-        lines += [
-            _row(answer.statement, answer.published, answer.ours, _word(answer.agrees), answer.rule) for answer in rows
-        ]
-        lines.append("")
-    lines += [_belief(), ""]
-    lines += _cases_table(study, runs, case.half, case.masses[-1])
-    if sensitivity is not None:
-        lines += sensitivity_section(sensitivity.load(), images)
-    lines += ["## Figures", "", "Numbered as in the published study.", ""]
-    for number, path in sorted(figures.items()):
-        lines += [f"**Figure {number.lstrip('0')}**: {CAPTIONS[number]}.", "", f"![{CAPTIONS[number]}]"
-                  f"({path.relative_to(out).as_posix()})", ""]  # fmt: skip
-    page = out / "study.md"
-    page.write_text("\n".join(lines), encoding="utf-8")
-    answers = [answer._asdict() for rows in sections.values() for answer in rows]
+    missing = [f"case {k}" for k in range(1, 11) if f"case-{k}" not in runs] + ["twin tunnels"] * (twin is None)
+    missing += [name for name in ("meshes", "unknowns", "twin-unknowns") if not finished(folder / name)]
+    blocks = {
+        "made": _made(case, missing),
+        "count": _count(verdicts),
+        **{group: _table(verdicts, statements(group)) for group in ("initial", "gushing", "twin")},
+        "disagreements": _disagreements(verdicts),
+        "unknowns": _changed(rows),
+        "trends": _trends(study, case.compared),
+        "cases": _cases(study, case.compared, runs),
+        "meshes": _meshes(runs, others),
+        "linings": _linings(study, folder),
+        "rates": _rates(case, rows),
+        "figures": [line for number in SHOWN if number in figures for line in _figure(number, figures[number], out)],
+        "rules": [_text("rules.md")],
+    }
+    page = out / "published.md"
+    page.write_text(_filled(_text("page.md"), blocks), encoding="utf-8")
+    answers = [
+        {"statement": v.statement.text, "published": v.statement.published, "ours": _ours(v), "low": v.low, "high": v.high,
+         "agrees": v.agrees, "rule": v.statement.rule} for v in verdicts.values()
+    ]  # fmt: skip
     shown = {number: str(path) for number, path in figures.items()}
     return {"page": str(page), "figures": shown, "answers": answers, "missing": missing}
 
 
-def sensitivity_section(study, images: Path) -> list[str]:
-    """Table and figure of a one-at-a-time study: inflow rate and response at equal inflow mass.
+def judge_case(case: RunEvidence, meshes: dict[float, RunEvidence], unknowns) -> tuple[dict[str, Verdict], list]:
+    """Verdicts on case 3 by the keys of the statements, and what every changed run says: (words, found)."""
+    found = measured_case(case)
+    of_mesh = {1.0: found} | {size: measured_case(one) for size, one in meshes.items()}
+    said = {id(run.evidence): measured_case(run.evidence) for run in unknowns}
+    pairs = moved_by(unknowns, lambda evidence: said[id(evidence)]) | moved_by_rings(case, measured_case)
+    rows = [(told(run.changes), said[id(run.evidence)]) for run in unknowns]
+    return _verdicts(statements("initial", "gushing"), found, of_mesh, pairs), rows
 
-    Parameters
-    ----------
-    study : xarray.Dataset
-        Dataset of the study `sensitivity`; its first case is the scene as it is.
-    images : path
-        Folder for the figure.
-    """
-    from coupling.figures import RESOLUTION
-    from verification.published.sensitivity_figure import changes, sensitivity_figure
 
-    table = changes(study)
-    if not table["rows"]:
-        return []
-    images.mkdir(parents=True, exist_ok=True)
-    sensitivity_figure(table).savefig(images / "sensitivity.png", dpi=RESOLUTION)
-    names = list(table["units"])
-    head = [f"{name} [{unit}]" for name, unit in table["units"].items()]
-    lines = [
-        "## Sensitivity",
-        "",
-        f"Coarse case 3 at {table['inflow_mass']:.0f} kg/m, one change at a time; the first row is the scene as it is.",
-        "",
-        _row("change", *head),
-        "|---|" + "---|" * len(head),
-    ]
-    for row in table["rows"]:
-        cells = [f"{row[name]:.4g}" if np.isfinite(row[name]) else "not reached" for name in names]
-        lines.append(_row(row["change"], *cells))
-    lines += ["", "![sensitivity](images/study/sensitivity.png)", ""]
+def judge_twin(twin: RunEvidence, meshes: dict[float, RunEvidence], unknowns) -> dict[str, Verdict]:
+    """Verdicts on the twin tunnels by the keys of the statements."""
+    found = measured_twin(twin)
+    of_mesh = {1.0: found} | {size: measured_twin(one) for size, one in meshes.items()}
+    return _verdicts(statements("twin"), found, of_mesh, moved_by(unknowns, measured_twin))
+
+
+def _verdicts(stated, found, of_mesh, pairs):
+    return {
+        key: judged(
+            statement, found[key], {size: one[key] for size, one in of_mesh.items() if key in one},
+            {name: [(a[key], b[key]) for a, b in changed if key in a and key in b] for name, changed in pairs.items()},
+        )
+        for key, statement in stated.items() if key in found
+    }  # fmt: skip
+
+
+def _bonded(run, folder):
+    return RunEvidence(run.scene, run.folder, at_rest(run.scene, folder / "at-rest" / f"{run.scene.name}.nc"))
+
+
+def _by_scene(runs, folder):
+    """Runs on other meshes: name of the scene to size of the mesh over that of the scene to evidence."""
+    from coupling.scenes.scene import load_scene
+
+    found = {}
+    for run in runs:
+        scene = run.evidence.scene
+        size = scene.mpm.discretisation.element_size / load_scene(scene.name).mpm.discretisation.element_size
+        rest = at_rest(scene, folder / "at-rest" / f"{scene.name}-{size:.2g}.nc")
+        found.setdefault(scene.name, {})[size] = RunEvidence(scene, run.evidence.folder, rest)
+    return found
+
+
+def _made(case, missing):
+    d = case.scene.mpm.discretisation
+    text = (
+        f"Made by `gush published` on {datetime.now(UTC):%Y-%m-%d} from runs of {provenance(case.folder)}; elements of "
+        f"{d.element_size:g} m, {d.element_size_lining:g} m at the lining, {d.elements_across_gate} across the gate. "
+        f"Published: {published_numbers()['source']}; angles from the crown, clockwise; per metre of tunnel; at "
+        f"{case.compared:.0f} kg/m unless said."
+    )
+    return [text + (f" Not finished, so left out: {', '.join(missing)}." if missing else "")]
+
+
+def _count(verdicts):
+    judged_ones = [one.agrees for one in verdicts.values() if one.agrees]
+    yes, band = (judged_ones.count(word) for word in ("yes", "in the band"))
+    return [f"**{yes + band} of {len(judged_ones)} statements agree**: {yes} as run, {band} in the band of what the source "
+            f"does not state, {judged_ones.count('no')} do not."]  # fmt: skip
+
+
+def _ours(verdict):
+    value, more = verdict.statement.form.format(verdict.found.value), verdict.found.more
+    return f"{more} ({value})" if more else value
+
+
+def _table(verdicts, stated):
+    lines = [_row("statement", "published", "ours", "mesh ±", "band", "agrees", "rule", "largest shares of the unknowns"),
+             "|---" * 8 + "|"]  # fmt: skip
+    for key in stated:
+        if key not in verdicts:
+            continue
+        v = verdicts[key]
+        form = _bare(v.statement.form)
+        band = f"{form.format(v.low)} .. {form.format(v.high)}" if v.high > v.low else ""
+        mesh = form.format(v.mesh).replace("+", "") if v.mesh else ""
+        word = "**no**" if v.agrees == "no" else v.agrees
+        lines.append(_row(v.statement.text, v.statement.published, _ours(v), mesh, band, word, v.statement.rule,
+                          _shares(v, 3)))  # fmt: skip
     return lines
 
 
-def _cases_table(study, runs, *masses):
-    """Largest forces of all cases at some inflow masses, both lining models; else how far a case came."""
-    lines = ["## Cases", ""]
-    for mass in masses:
-        now = at_study_inflow(study, mass)
-        lines += [f"At {mass:.0f} kg/m, in brackets initially:", "",
-                  "| case | gate | cover | soil | model | N kN/m | Q kN/m | M kN m/m | M least kN m/m | time s |",
-                  "|---|---|---|---|---|---|---|---|---|---|"]  # fmt: skip
-        for k, name in enumerate(study["scene"].values):
-            about = f"{study['gate_angle'].values[k]:g}° | {study['cover'].values[k]:g} m | {study['soil'].values[k]}"
-            if str(study["status"].values[k]) != "finished":
-                lines.append(f"| {name} | {about} | {study['message'].values[k] or 'not run'} |||||||")
-                continue
-            for model in study["model"].values:
-                one, first = (data.isel(case=k).sel(model=model) for data in (now, study.isel(progress=0)))
-                cells = []
-                for variable, pick in (("axial_force", np.max), ("shear_force", _largest), ("bending_moment", np.max),
-                                       ("bending_moment", np.min)):  # fmt: skip
-                    before, after = (float(pick(state[variable].values)) / 1e3 for state in (first, one))
-                    cells.append(f"{after:.0f} ({before:.0f})" if np.isfinite(after) else f"not reached ({before:.0f})")
-                time = f"{float(now['time'].isel(case=k)):.3g}"
-                if runs[k] is not None and runs[k].last_mass < mass:
-                    time = f"ended at {runs[k].last_mass:.0f} kg/m"
-                lines.append(f"| {name} | {about} | {model} | {' | '.join(cells)} | {time} |")
-        lines.append("")
+def _shares(verdict, most):
+    form = _signed(verdict.statement.form)
+    rows = [f"{name} {form.format(low)} .. {form.format(high)}" for name, (low, high) in verdict.shares.items()]
+    return "; ".join(rows[:most])
+
+
+def _bare(form):
+    """A form without the words around its number."""
+    return re.search(r"\{:[^}]*\}", form)[0]
+
+
+def _signed(form):
+    return _bare(form).replace("{:+", "{:").replace("{:", "{:+")
+
+
+def _disagreements(verdicts):
+    reasons, lines = published_numbers().get("reasons", {}), []
+    for key, v in verdicts.items():
+        if v.agrees == "no":
+            lines.append(f"- **{v.statement.text}**: published {v.statement.published}, ours {_ours(v)}. "
+                         + reasons.get(key, "Reason: unknown."))  # fmt: skip
+    return lines or ["None."]
+
+
+def _changed(rows):
+    if not rows:
+        return ["Not run."]
+    lines = [_row("changed", *COLUMNS.values()), "|---" * (len(COLUMNS) + 1) + "|"]
+    stated = statements("gushing")
+    for words, found in rows:
+        cells = [_bare(stated[key].form).format(found[key].value) if key in found else "not reached" for key in COLUMNS]
+        lines.append(_row(words, *cells))
     return lines
 
 
-def _belief():
-    """What we make of the differences, in words."""
-    return (resources.files("verification") / "published" / "belief.md").read_text(encoding="utf-8").rstrip()
+def _trends(study, mass):
+    from verification.published.trends import trends
+
+    lines = [_row("statement", "ours", "agrees"), "|---|---|---|"]
+    return lines + [_row(one.statement, one.ours, {True: "yes", False: "**no**"}[bool(one.agrees)])
+                    for one in trends(study, mass)]  # fmt: skip
 
 
-def _verdict(answers):
-    judged = [answer for answer in answers if answer.agrees is not None]
-    wrong = [answer.statement for answer in judged if not answer.agrees]
-    text = f"{len(judged) - len(wrong)} of {len(judged)} statements agree by their rule."
-    return [text + (" Not: " + "; ".join(wrong) + "." if wrong else ""), ""]
+def _cases(study, mass, runs):
+    """Largest forces of all cases, both lining models; else how far a case came."""
+    from verification.published.case_figures import at_study_inflow
+
+    now, lines = at_study_inflow(study, mass), [
+        _row("case", "gate", "cover", "soil", "model", "N kN/m", "Q kN/m", "M kN m/m", "M least kN m/m", "time s"),
+        "|---" * 10 + "|",
+    ]  # fmt: skip
+    for k, name in enumerate(study["scene"].values):
+        about = [f"{study['gate_angle'].values[k]:g}°", f"{study['cover'].values[k]:g} m", str(study["soil"].values[k])]
+        for model in study["model"].values if str(study["status"].values[k]) == "finished" else ():
+            one, first = (data.isel(case=k).sel(model=model) for data in (now, study.isel(progress=0)))
+            cells = []
+            for variable, pick in (("axial_force", np.max), ("shear_force", lambda v: np.abs(v).max()),
+                                   ("bending_moment", np.max), ("bending_moment", np.min)):  # fmt: skip
+                before, after = (float(pick(state[variable].values)) / 1e3 for state in (first, one))
+                cells.append(f"{after:.0f} ({before:.0f})" if np.isfinite(after) else f"({before:.0f})")
+            reached = float(now["time"].isel(case=k))
+            time = f"{reached:.2f}" if np.isfinite(reached) else f"ended at {runs[name].reached:.0f} kg/m"
+            lines.append(_row(name, *about, model, *cells, time))
+    return lines
+
+
+def _meshes(runs, others):
+    """Cases on several meshes: what must not depend on them."""
+    from coupling import postprocess
+
+    lines = [_row("scene", "mesh", "reached kg/m", "time to 500 kg/m s", "N", "Q", "M", "M least", "settlement mm"),
+             "|---" * 9 + "|"]  # fmt: skip
+    for name, sizes in others.items():
+        for size, run in {1.0: runs[name], **sizes}.items() if name in runs else ():
+            mass = min(run.compared, *(one.compared for one in sizes.values()), runs[name].compared)
+            time = float(postprocess.at_inflow(run.history, min(500.0, mass))["time"])
+            now = postprocess.at_inflow(run.responses["beam-spring"], mass)
+            moment, shear = now["bending_moment"].values / 1e3, np.abs(now["shear_force"].values).max() / 1e3
+            down = 1e3 * float(postprocess.at_inflow(run.settlement, mass)["settlement"].max())
+            lines.append(_row(name, f"{size:.2g} times", f"{run.reached:.0f}", f"{time:.3f}",
+                              f"{now['axial_force'].values.max() / 1e3:.0f}", f"{shear:.0f}", f"{moment.max():.0f}",
+                              f"{moment.min():.0f}", f"{down:.1f}"))  # fmt: skip
+    return lines
+
+
+def _linings(study, folder):
+    from verification.published.linings import lining_lines
+
+    return lining_lines(study, folder)
+
+
+def _rates(case, rows):
+    from verification.published.rates import independent_rates
+
+    theirs = published_numbers()["gushing"]
+    published = next(row["published"] for row in theirs if row["key"] == "rate")
+    found = [("published", float(published)), *independent_rates(case.scene.mpm).items()]
+    found += [(f"ours, {words}", said["rate"].value) for words, said in rows if "rate" in said]
+    lines = [_row("rate", "kg/m/s"), "|---|---|"]
+    return lines + [_row(name, f"{value:.3g}") for name, value in sorted(found, key=lambda item: -item[1])]
+
+
+def _figure(number, path, out):
+    from verification.published.draw import CAPTIONS
+
+    text = CAPTIONS[number]
+    title = f"Figure {number.lstrip('0')}" if number[0].isdigit() else "Bands"
+    return [f"**{title}**: {text}.", "", f"![{text}]({path.relative_to(out).as_posix()})", ""]
 
 
 def _row(*cells):
     """A row of a table; bars inside its cells, as of |Q|, are escaped."""
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+    return "| " + " | ".join(re.sub(r"(?<!\\)\|", "\\|", cell) for cell in cells) + " |"
 
 
-def _largest(values):
-    return np.abs(values).max()
+def _text(name):
+    return (resources.files("verification") / "published" / name).read_text(encoding="utf-8").rstrip()
 
 
-def _word(agrees):
-    return {True: "yes", False: "**no**", None: ""}[None if agrees is None else bool(agrees)]
-
-
-def _provenance(run):
-    from coupling.datasets import read_attributes
-
-    attributes, d = read_attributes(run.folder), run.scene.mpm.discretisation
-    return (
-        f"from runs of revision {attributes['revision'] or 'unknown'} on {attributes['processor']}; elements of "
-        f"{d.element_size:g} m, {d.element_size_lining:g} m at the lining, {d.elements_across_gate} across the gate"
-    )
-
-
-def _optional(read, folder):
-    from coupling.studies.design import StudyError
-
-    try:
-        return read(folder)
-    except StudyError:
-        return None
+def _filled(text, blocks):
+    """The text with lines `{{name}}` replaced by the lines of that block."""
+    return re.sub(r"^\{\{(\S+)\}\}$", lambda found: "\n".join(blocks[found[1]]), text, flags=re.MULTILINE) + "\n"
