@@ -1,4 +1,4 @@
-"""The band of a statement: our number, what each number that the source does not state moves it by, and the mesh error."""
+"""The band of a statement: our number, what each unknown of the source moves it by, and the error of our mesh."""
 
 from __future__ import annotations
 

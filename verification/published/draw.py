@@ -85,19 +85,18 @@ def draw_twin(twin, folder: str | Path) -> dict[str, Path]:
     )
 
 
-def draw_cases(study, inflow_mass: float, folder: str | Path) -> dict[str, Path]:
-    """Figures 19 to 23 of the study `cases` at an inflow mass [kg/m]."""
-    one, at = case_figures, inflow_mass
-    axial, moment = "additional axial force [kN/m]", "additional bending moment [kN m/m]"
+def draw_cases(cases, folder: str | Path) -> dict[str, Path]:
+    """Figures 19 to 23 of all cases at 1000 kg/m; cases: evidence by scene."""
+    one = case_figures
     return _saved(
         folder,
         {
-            "19": lambda: one.pressure_ratios(study, at),
-            "20": lambda: one.additional_forces(study, at, "axial_force", axial),
-            "21": lambda: one.additional_forces(study, at, "bending_moment", moment),
-            "22": lambda: one.deformation(study, at),
-            "22-displacement": lambda: one.displacement(study, at),
-            "23": lambda: one.joint_deformation(study, at),
+            "19": lambda: one.pressure_ratios(cases),
+            "20": lambda: one.additional_force(cases, "axial_force", "additional axial force [kN/m]"),
+            "21": lambda: one.additional_force(cases, "bending_moment", "additional bending moment [kN m/m]"),
+            "22": lambda: one.deformation(cases),
+            "22-displacement": lambda: one.displacement(cases),
+            "23": lambda: one.joint_deformation(cases),
         },
     )
 
@@ -144,7 +143,7 @@ def draw_study(study: str | Path, folder: str | Path) -> dict[str, Path]:
     coupling.studies.design.StudyError
         No study there, or none of those scenes in it is finished.
     """
-    from coupling.studies.collect import read_study, stored_cases
+    from coupling.studies.collect import stored_cases
     from coupling.studies.design import StudyError
     from verification.published.unknowns import finished
 
@@ -154,10 +153,7 @@ def draw_study(study: str | Path, folder: str | Path) -> dict[str, Path]:
     if "twin-tunnels" in runs:
         written |= draw_twin(runs["twin-tunnels"], folder)
     if "case-3" in runs:
-        written |= draw_case(runs["case-3"], folder)
-        data = read_study(study).load()
-        if "scene" in data.coords:
-            written |= draw_cases(data, runs["case-3"].compared, folder)
+        written |= draw_case(runs["case-3"], folder) | draw_cases(runs, folder)
     if not written:
         raise StudyError(f"study '{study}': must hold a finished case-3 or twin-tunnels, got neither; run gush study")
     return written

@@ -66,6 +66,11 @@ class RunEvidence:
                 continue
         return found
 
+    @cached_property
+    def added(self):
+        """What the event has added to the beam-spring ring at :attr:`compared`."""
+        return postprocess.additional_at_inflow(self.responses["beam-spring"], self.compared)
+
     @property
     def reached(self) -> float:
         """Largest inflow mass of the run [kg/m]."""

@@ -51,7 +51,8 @@ def inflow_and_stages(history):
         upper.plot(time, history["inflow_mass"], color=NOW)
         upper.set_ylabel("inflow mass [kg/m]")
         lower.plot(time, history["flow_zone_area"], color=GATE, label=f"flow zone (> {ZONES[0]:g} mm)")
-        lower.plot(time, history["disturbed_area"], color=SECOND, ls="--", label=f"disturbed ({ZONES[1]:g} to {ZONES[0]:g} mm)")
+        disturbed = f"disturbed ({ZONES[1]:g} to {ZONES[0]:g} mm)"
+        lower.plot(time, history["disturbed_area"], color=SECOND, ls="--", label=disturbed)
         lower.plot(nodes, stages.areas, "o-", color="0.2", lw=0.8, ms=3, label="three straight pieces")
         lower.set_ylabel("area [m²]")
         lower.set_xlabel("time since the gate opened [s]")
@@ -107,7 +108,7 @@ def fields_around(fields, mesh, mass):
 
 
 def stress_variation_fields(fields, mesh, masses, name="soil_stress_vertical"):
-    """R_sigma (Eq. 10) of a stress around the tunnel at some inflow masses [kg/m]; otherwise as :func:`fields_around`."""
+    """R_sigma (Eq. 10) of a stress around the tunnel at some inflow masses [kg/m]; as :func:`fields_around`."""
     initial = fields[name].isel(time=0, drop=True)
     with matplotlib.rc_context(STYLE):
         figure = Picture(figsize=(3.4 * len(masses) + 0.6, 3.5), layout="constrained")

@@ -38,7 +38,7 @@ def rings(panels, columns, gate=None, joints=(), heads=()):
     count = -(-len(panels) // columns)
     with matplotlib.rc_context(STYLE):
         figure = Picture(figsize=(7.4, 3.0 * count + 0.3 * bool(heads)), layout="constrained")
-        axes = np.atleast_1d(figure.subplots(count, columns, subplot_kw={"projection": "polar"})).reshape(count, columns)
+        axes = figure.subplots(count, columns, subplot_kw={"projection": "polar"}, squeeze=False)
         for axis, (title, curves) in zip(axes.flat, panels, strict=True):
             crown_up(axis)
             for label, values, style in curves:
@@ -96,8 +96,9 @@ def initial_pressures(pressures, theory):
 
 def pressures_by_inflow(pressures, masses, joints=()):
     """Soil and water pressure around the lining, initial and at some inflow masses [kg/m]."""
+    states = _states(pressures, masses)
     panels = [
-        (f"{title} [kPa]", [(label, state[name].values / 1e3, style) for label, state, style in _states(pressures, masses)])
+        (f"{title} [kPa]", [(label, state[name].values / 1e3, style) for label, state, style in states])
         for name, title in PRESSURES.items()
     ]
     return rings(panels, 2, gate_of(pressures).angle, joints)
@@ -140,8 +141,9 @@ def extremes_over_inflow(responses):
 
 def joints_over_inflow(response):
     """Opening, dislocation and rotation of every joint over inflow mass, response of one lining model."""
+    mass = response["inflow_mass"]
     return _over_inflow([
-        (title, [(f"joint {joint}", response["inflow_mass"], scale * response[name].sel(joint=joint), {"color": f"C{k}"})
+        (title, [(f"joint {joint}", mass, scale * response[name].sel(joint=joint), {"color": f"C{k}"})
                  for k, joint in enumerate(response["joint"].values)])
         for name, (title, scale) in JOINTS.items()
     ])  # fmt: skip

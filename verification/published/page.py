@@ -9,17 +9,26 @@ from pathlib import Path
 
 import numpy as np
 
-from verification.published.bands import Verdict, judged
-from verification.published.evidence import COMPARED, RunEvidence, at_rest, provenance
+from coupling import postprocess
+from coupling.refused import SceneError
+from verification.published.bands import judged
+from verification.published.draw import CAPTIONS, draw_bands, draw_case, draw_cases, draw_twin
+from verification.published.evidence import RunEvidence, at_rest, provenance
+from verification.published.linings import one_layer
+from verification.published.rates import independent_rates
+from verification.published.runs import SOURCE_MESH
 from verification.published.statements import measured_case, measured_twin, published_numbers, statements
+from verification.published.trends import trends
 from verification.published.unknowns import finished, moved_by, moved_by_rings, told
 
 #: Pictures that the page shows; all others are drawn beside them.
 SHOWN = ("bands", "06", "09", "10", "11", "13", "15", "23")
-#: What of a changed run is told: key of a statement, head of the column.
+#: What of a changed run is told: key of a statement, head of the column; of one that changes the lining, more.
 COLUMNS = {"rate": "inflow kg/m/s", "soil gate": "soil at gate", "water gate": "water at gate", "crown": "crown %",
            "invert": "invert %", "Q": "Q %", "M+": "M+ %", "M-": "M- %", "N": "N %", "influence_soil": "soil D",
            "influence_water": "water D", "arch": "arch D"}  # fmt: skip
+LININGS = {**{f"M{k}": f"M joint {k}" for k in range(1, 7)}, "M invert": "M invert", "Q": "Q %", "M+": "M+ %",
+           "M-": "M- %", "crown": "crown %", "invert": "invert %", "rate": "inflow kg/m/s"}  # fmt: skip
 
 
 def write_page(folder: str | Path, out: str | Path) -> dict:
@@ -40,27 +49,26 @@ def write_page(folder: str | Path, out: str | Path) -> dict:
 
     Raises
     ------
-    coupling.studies.design.StudyError
+    coupling.refused.SceneError
         Case 3 is not there.
     """
-    from coupling.studies.collect import read_study
-    from coupling.studies.design import StudyError
-    from verification.published.draw import draw_bands, draw_case, draw_cases, draw_twin
-
     folder, out = Path(folder), Path(out)
     runs = {run.evidence.scene.name: run.evidence for run in finished(folder / "cases")}
     if "case-3" not in runs:
-        raise StudyError(f"study '{folder / 'cases'}': case 3 must be finished; run gush published --out {folder}")
-    case, twin = (_bonded(runs[name], folder) if name in runs else None for name in ("case-3", "twin-tunnels"))
-    others = _by_scene(finished(folder / "meshes"), folder)
-    verdicts, rows = judge_case(case, others.get("case-3", {}), finished(folder / "unknowns"))
-    if twin is not None:
-        verdicts |= judge_twin(twin, others.get("twin-tunnels", {}), finished(folder / "twin-unknowns"))
-    study = read_study(folder / "cases").load()
+        raise SceneError(f"study '{folder / 'cases'}': case 3 must be finished; run gush published --out {folder}")
+    runs |= {name: _bonded(runs[name], folder) for name in ("case-3", "twin-tunnels") if name in runs}
+    case, twin = runs["case-3"], runs.get("twin-tunnels")
+    meshes = _by_mesh(finished(folder / "meshes"), runs, folder)
+    verdicts, rows = judge_case(case, meshes.get("case-3", {}), finished(folder / "unknowns"))
     images = out / "images" / "published"
-    figures = draw_bands(verdicts, images) | draw_case(case, images) | draw_cases(study, case.compared, images)
     if twin is not None:
-        figures |= draw_twin(twin, images)
+        changed = moved_by(finished(folder / "twin-unknowns"), measured_twin)
+        verdicts |= _verdicts(("twin",), meshes.get("twin-tunnels", {1.0: twin}), measured_twin, changed, twin)
+        figures = draw_twin(twin, images)
+    else:
+        figures = {}
+    cases = {name: run for name, run in runs.items() if name != "twin-tunnels"}
+    figures |= draw_bands(verdicts, images) | draw_case(case, images) | draw_cases(cases, images)
     missing = [f"case {k}" for k in range(1, 11) if f"case-{k}" not in runs] + ["twin tunnels"] * (twin is None)
     missing += [name for name in ("meshes", "unknowns", "twin-unknowns") if not finished(folder / name)]
     blocks = {
@@ -68,11 +76,13 @@ def write_page(folder: str | Path, out: str | Path) -> dict:
         "count": _count(verdicts),
         **{group: _table(verdicts, statements(group)) for group in ("initial", "gushing", "twin")},
         "disagreements": _disagreements(verdicts),
-        "unknowns": _changed(rows),
-        "trends": _trends(study, case.compared),
-        "cases": _cases(study, case.compared, runs),
-        "meshes": _meshes(runs, others),
-        "linings": _linings(study, folder),
+        "unknowns": _changed(rows, COLUMNS),
+        "trends": _markdown(
+            ["statement", "ours", "agrees"], [(one.statement, one.ours, _word(one.agrees)) for one in trends(cases)]
+        ),
+        "cases": _cases(cases),
+        "meshes": _meshes(meshes),
+        "linings": _linings(case, rows),
         "rates": _rates(case, rows),
         "figures": [line for number in SHOWN if number in figures for line in _figure(number, figures[number], out)],
         "rules": [_text("rules.md")],
@@ -80,73 +90,70 @@ def write_page(folder: str | Path, out: str | Path) -> dict:
     page = out / "published.md"
     page.write_text(_filled(_text("page.md"), blocks), encoding="utf-8")
     answers = [
-        {"statement": v.statement.text, "published": v.statement.published, "ours": _ours(v), "low": v.low, "high": v.high,
-         "agrees": v.agrees, "rule": v.statement.rule} for v in verdicts.values()
+        {"statement": v.statement.text, "published": v.statement.published, "ours": _ours(v), "low": v.low,
+         "high": v.high, "agrees": v.agrees, "rule": v.statement.rule} for v in verdicts.values()
     ]  # fmt: skip
     shown = {number: str(path) for number, path in figures.items()}
     return {"page": str(page), "figures": shown, "answers": answers, "missing": missing}
 
 
-def judge_case(case: RunEvidence, meshes: dict[float, RunEvidence], unknowns) -> tuple[dict[str, Verdict], list]:
-    """Verdicts on case 3 by the keys of the statements, and what every changed run says: (words, found)."""
-    found = measured_case(case)
-    of_mesh = {1.0: found} | {size: measured_case(one) for size, one in meshes.items()}
+def judge_case(case: RunEvidence, meshes: dict[float, RunEvidence], unknowns):
+    """Verdicts on case 3 by the keys of the statements, and what every changed run says: list of (words, found)."""
     said = {id(run.evidence): measured_case(run.evidence) for run in unknowns}
-    pairs = moved_by(unknowns, lambda evidence: said[id(evidence)]) | moved_by_rings(case, measured_case)
+    changed = moved_by(unknowns, lambda evidence: said[id(evidence)]) | moved_by_rings(case, measured_case)
     rows = [(told(run.changes), said[id(run.evidence)]) for run in unknowns]
-    return _verdicts(statements("initial", "gushing"), found, of_mesh, pairs), rows
+    return _verdicts(("initial", "gushing"), meshes or {1.0: case}, measured_case, changed, case), rows
 
 
-def judge_twin(twin: RunEvidence, meshes: dict[float, RunEvidence], unknowns) -> dict[str, Verdict]:
-    """Verdicts on the twin tunnels by the keys of the statements."""
-    found = measured_twin(twin)
-    of_mesh = {1.0: found} | {size: measured_twin(one) for size, one in meshes.items()}
-    return _verdicts(statements("twin"), found, of_mesh, moved_by(unknowns, measured_twin))
-
-
-def _verdicts(stated, found, of_mesh, pairs):
+def _verdicts(groups, meshes, measure, changed, own):
+    found = measure(own)
+    of_mesh = {size: found if run is own else measure(run) for size, run in meshes.items()}
     return {
         key: judged(
             statement, found[key], {size: one[key] for size, one in of_mesh.items() if key in one},
-            {name: [(a[key], b[key]) for a, b in changed if key in a and key in b] for name, changed in pairs.items()},
+            {name: [(a[key], b[key]) for a, b in pairs if key in a and key in b] for name, pairs in changed.items()},
         )
-        for key, statement in stated.items() if key in found
+        for key, statement in statements(*groups).items() if key in found
     }  # fmt: skip
 
 
-def _bonded(run, folder):
-    return RunEvidence(run.scene, run.folder, at_rest(run.scene, folder / "at-rest" / f"{run.scene.name}.nc"))
+def _bonded(run, folder, mark=""):
+    return RunEvidence(run.scene, run.folder, at_rest(run.scene, folder / "at-rest" / f"{run.scene.name}{mark}.nc"))
 
 
-def _by_scene(runs, folder):
-    """Runs on other meshes: name of the scene to size of the mesh over that of the scene to evidence."""
+def _by_mesh(others, runs, folder):
+    """Name of a scene with several meshes to size of the mesh over the scene's to evidence, that of `runs` among it."""
     from coupling.scenes.scene import load_scene
 
+    def size(scene):
+        return scene.mpm.discretisation.element_size / load_scene(scene.name).mpm.discretisation.element_size
+
     found = {}
-    for run in runs:
-        scene = run.evidence.scene
-        size = scene.mpm.discretisation.element_size / load_scene(scene.name).mpm.discretisation.element_size
-        rest = at_rest(scene, folder / "at-rest" / f"{scene.name}-{size:.2g}.nc")
-        found.setdefault(scene.name, {})[size] = RunEvidence(scene, run.evidence.folder, rest)
+    for run in (case.evidence for case in others):
+        name = run.scene.name
+        if name in runs:
+            sizes = found.setdefault(name, {size(runs[name].scene): runs[name]})
+            bonded = name in ("case-3", "twin-tunnels")
+            sizes[size(run.scene)] = _bonded(run, folder, f"-{size(run.scene):.2g}") if bonded else run
     return found
 
 
 def _made(case, missing):
-    d = case.scene.mpm.discretisation
+    mesh, source = case.scene.mpm.discretisation, published_numbers()["source"]
     text = (
-        f"Made by `gush published` on {datetime.now(UTC):%Y-%m-%d} from runs of {provenance(case.folder)}; elements of "
-        f"{d.element_size:g} m, {d.element_size_lining:g} m at the lining, {d.elements_across_gate} across the gate. "
-        f"Published: {published_numbers()['source']}; angles from the crown, clockwise; per metre of tunnel; at "
-        f"{case.compared:.0f} kg/m unless said."
+        f"Made by `gush published` on {datetime.now(UTC):%Y-%m-%d} from runs of {provenance(case.folder)}; case 3 on "
+        f"elements of {mesh.element_size:g} m, {mesh.element_size_lining:g} m at the lining, "
+        f"{mesh.elements_across_gate} across the gate. Published: {source}; angles from the crown, clockwise; per metre "
+        f"of tunnel; at {case.compared:.0f} kg/m unless said."
     )
     return [text + (f" Not finished, so left out: {', '.join(missing)}." if missing else "")]
 
 
 def _count(verdicts):
-    judged_ones = [one.agrees for one in verdicts.values() if one.agrees]
-    yes, band = (judged_ones.count(word) for word in ("yes", "in the band"))
-    return [f"**{yes + band} of {len(judged_ones)} statements agree**: {yes} as run, {band} in the band of what the source "
-            f"does not state, {judged_ones.count('no')} do not."]  # fmt: skip
+    words = [one.agrees for one in verdicts.values() if one.agrees]
+    yes, band = (words.count(word) for word in ("yes", "in the band"))
+    text = f"**{yes + band} of {len(words)} statements agree**: {yes} as run, {band} in the band of what the source"
+    return [f"{text} does not state; {words.count('no')} do not."]
 
 
 def _ours(verdict):
@@ -155,25 +162,17 @@ def _ours(verdict):
 
 
 def _table(verdicts, stated):
-    lines = [_row("statement", "published", "ours", "mesh ±", "band", "agrees", "rule", "largest shares of the unknowns"),
-             "|---" * 8 + "|"]  # fmt: skip
-    for key in stated:
-        if key not in verdicts:
-            continue
-        v = verdicts[key]
+    rows = []
+    for v in (verdicts[key] for key in stated if key in verdicts):
         form = _bare(v.statement.form)
         band = f"{form.format(v.low)} .. {form.format(v.high)}" if v.high > v.low else ""
         mesh = form.format(v.mesh).replace("+", "") if v.mesh else ""
-        word = "**no**" if v.agrees == "no" else v.agrees
-        lines.append(_row(v.statement.text, v.statement.published, _ours(v), mesh, band, word, v.statement.rule,
-                          _shares(v, 3)))  # fmt: skip
-    return lines
-
-
-def _shares(verdict, most):
-    form = _signed(verdict.statement.form)
-    rows = [f"{name} {form.format(low)} .. {form.format(high)}" for name, (low, high) in verdict.shares.items()]
-    return "; ".join(rows[:most])
+        signed = form.replace("{:+", "{:").replace("{:", "{:+")
+        shares = [f"{name} {signed.format(low)} .. {signed.format(high)}" for name, (low, high) in v.shares.items()]
+        word = v.agrees if v.agrees != "no" else _word(False)
+        rows.append((v.statement.text, v.statement.published, _ours(v), mesh, band, word, v.statement.rule,
+                     "; ".join(shares[:3])))  # fmt: skip
+    return _markdown(["statement", "published", "ours", "mesh ±", "band", "agrees", "rule", "largest shares"], rows)
 
 
 def _bare(form):
@@ -181,108 +180,93 @@ def _bare(form):
     return re.search(r"\{:[^}]*\}", form)[0]
 
 
-def _signed(form):
-    return _bare(form).replace("{:+", "{:").replace("{:", "{:+")
-
-
 def _disagreements(verdicts):
-    reasons, lines = published_numbers().get("reasons", {}), []
-    for key, v in verdicts.items():
-        if v.agrees == "no":
-            lines.append(f"- **{v.statement.text}**: published {v.statement.published}, ours {_ours(v)}. "
-                         + reasons.get(key, "Reason: unknown."))  # fmt: skip
+    reasons = published_numbers()["reasons"]
+    wrong = {key: v for key, v in verdicts.items() if v.agrees == "no"}
+    lines = [f"- **{v.statement.text}**: published {v.statement.published}, ours {_ours(v)}. "
+             + reasons.get(key, "Reason: unknown.") for key, v in wrong.items()]  # fmt: skip
     return lines or ["None."]
 
 
-def _changed(rows):
-    if not rows:
-        return ["Not run."]
-    lines = [_row("changed", *COLUMNS.values()), "|---" * (len(COLUMNS) + 1) + "|"]
-    stated = statements("gushing")
-    for words, found in rows:
-        cells = [_bare(stated[key].form).format(found[key].value) if key in found else "not reached" for key in COLUMNS]
-        lines.append(_row(words, *cells))
-    return lines
+def _changed(rows, columns):
+    """What changed runs say: one row a run, one column a statement."""
+    stated = statements("initial", "gushing")
+    lines = [
+        (words, *(_bare(stated[k].form).format(found[k].value) if k in found else "not reached" for k in columns))
+        for words, found in rows
+    ]
+    return _markdown(["changed", *columns.values()], lines)
 
 
-def _trends(study, mass):
-    from verification.published.trends import trends
-
-    lines = [_row("statement", "ours", "agrees"), "|---|---|---|"]
-    return lines + [_row(one.statement, one.ours, {True: "yes", False: "**no**"}[bool(one.agrees)])
-                    for one in trends(study, mass)]  # fmt: skip
-
-
-def _cases(study, mass, runs):
-    """Largest forces of all cases, both lining models; else how far a case came."""
-    from verification.published.case_figures import at_study_inflow
-
-    now, lines = at_study_inflow(study, mass), [
-        _row("case", "gate", "cover", "soil", "model", "N kN/m", "Q kN/m", "M kN m/m", "M least kN m/m", "time s"),
-        "|---" * 10 + "|",
-    ]  # fmt: skip
-    for k, name in enumerate(study["scene"].values):
-        about = [f"{study['gate_angle'].values[k]:g}°", f"{study['cover'].values[k]:g} m", str(study["soil"].values[k])]
-        for model in study["model"].values if str(study["status"].values[k]) == "finished" else ():
-            one, first = (data.isel(case=k).sel(model=model) for data in (now, study.isel(progress=0)))
-            cells = []
-            for variable, pick in (("axial_force", np.max), ("shear_force", lambda v: np.abs(v).max()),
-                                   ("bending_moment", np.max), ("bending_moment", np.min)):  # fmt: skip
-                before, after = (float(pick(state[variable].values)) / 1e3 for state in (first, one))
-                cells.append(f"{after:.0f} ({before:.0f})" if np.isfinite(after) else f"({before:.0f})")
-            reached = float(now["time"].isel(case=k))
-            time = f"{reached:.2f}" if np.isfinite(reached) else f"ended at {runs[name].reached:.0f} kg/m"
-            lines.append(_row(name, *about, model, *cells, time))
-    return lines
-
-
-def _meshes(runs, others):
-    """Cases on several meshes: what must not depend on them."""
-    from coupling import postprocess
-
-    lines = [_row("scene", "mesh", "reached kg/m", "time to 500 kg/m s", "N", "Q", "M", "M least", "settlement mm"),
-             "|---" * 9 + "|"]  # fmt: skip
-    for name, sizes in others.items():
-        for size, run in {1.0: runs[name], **sizes}.items() if name in runs else ():
-            mass = min(run.compared, *(one.compared for one in sizes.values()), runs[name].compared)
-            time = float(postprocess.at_inflow(run.history, min(500.0, mass))["time"])
-            now = postprocess.at_inflow(run.responses["beam-spring"], mass)
-            moment, shear = now["bending_moment"].values / 1e3, np.abs(now["shear_force"].values).max() / 1e3
-            down = 1e3 * float(postprocess.at_inflow(run.settlement, mass)["settlement"].max())
-            lines.append(_row(name, f"{size:.2g} times", f"{run.reached:.0f}", f"{time:.3f}",
-                              f"{now['axial_force'].values.max() / 1e3:.0f}", f"{shear:.0f}", f"{moment.max():.0f}",
-                              f"{moment.min():.0f}", f"{down:.1f}"))  # fmt: skip
-    return lines
-
-
-def _linings(study, folder):
-    from verification.published.linings import lining_lines
-
-    return lining_lines(study, folder)
+def _linings(case, rows):
+    tunnel, size = case.scene.mpm.tunnels[case.scene.mpm.gate.tunnel], SOURCE_MESH["element_size"]
+    stiff = one_layer(size, tunnel.outer_radius, tunnel.inner_radius, tunnel.lining_poissons_ratio)
+    moving = [row for row in rows[1:] if "lining" in row[0] or "layer" in row[0]]
+    thick = tunnel.outer_radius - tunnel.inner_radius
+    text = f"One layer of linear triangles of {size:g} m through {thick:.2f} m resists the second harmonic"
+    text += f" **{stiff:.1f} times** as much as the ring does (plane strain, against quadratic triangles)."
+    return [text, "", *_changed(rows[:1] + moving, LININGS)]
 
 
 def _rates(case, rows):
-    from verification.published.rates import independent_rates
-
-    theirs = published_numbers()["gushing"]
-    published = next(row["published"] for row in theirs if row["key"] == "rate")
+    published = next(row["published"] for row in published_numbers()["gushing"] if row["key"] == "rate")
     found = [("published", float(published)), *independent_rates(case.scene.mpm).items()]
     found += [(f"ours, {words}", said["rate"].value) for words, said in rows if "rate" in said]
-    lines = [_row("rate", "kg/m/s"), "|---|---|"]
-    return lines + [_row(name, f"{value:.3g}") for name, value in sorted(found, key=lambda item: -item[1])]
+    found.sort(key=lambda item: -item[1])
+    return _markdown(["rate", "kg/m/s"], [(name, f"{value:.3g}") for name, value in found])
+
+
+def _extremes(response, mass):
+    """Largest N, Q, M and least M of a response at an inflow mass, None: initially [kN, kN m]."""
+    state = response.isel(time=0) if mass is None else postprocess.at_inflow(response, mass)
+    axial, shear, moment = (state[f"{name}"].values / 1e3 for name in ("axial_force", "shear_force", "bending_moment"))
+    return np.array([axial.max(), np.abs(shear).max(), moment.max(), moment.min()])
+
+
+def _cases(cases):
+    """Largest forces of all cases at 1000 kg/m, or where they ended, in brackets initially, by both lining models."""
+    rows = []
+    for name, run in cases.items():
+        scene = run.scene.mpm
+        about = [name, f"{scene.gate.angle:g}°", f"{scene.tunnels[0].cover:g} m", scene.soils[0].name]
+        time = float(postprocess.at_inflow(run.history, run.compared)["time"])
+        for model, response in run.responses.items():
+            pairs = zip(_extremes(response, run.compared), _extremes(response, None), strict=True)
+            cells = [f"{after:.0f} ({before:.0f})" for after, before in pairs]
+            rows.append((*about, model, *cells, f"{run.compared:.0f} kg/m, {time:.2f} s"))
+    head = ["case", "gate", "cover", "soil", "model", "N kN/m", "Q kN/m", "M kN m/m", "M least kN m/m", "at"]
+    return _markdown(head, rows)
+
+
+def _meshes(meshes):
+    """Cases on several meshes: what must not depend on them, at the largest inflow mass that all reached."""
+    rows = []
+    for name, sizes in meshes.items():
+        mass = min(run.compared for run in sizes.values())
+        for size, run in sorted(sizes.items()):
+            time = float(postprocess.at_inflow(run.history, mass)["time"])
+            down = 1e3 * float(postprocess.at_inflow(run.settlement, mass)["settlement"].max())
+            cells = [f"{value:.0f}" for value in _extremes(run.responses["beam-spring"], mass)]
+            rows.append((name, f"{size:.2g} times", f"{mass:.0f}", f"{time:.3f}", *cells, f"{down:.1f}"))
+    return _markdown(["scene", "mesh", "at kg/m", "time s", "N", "Q", "M", "M least", "settlement mm"], rows)
 
 
 def _figure(number, path, out):
-    from verification.published.draw import CAPTIONS
-
-    text = CAPTIONS[number]
     title = f"Figure {number.lstrip('0')}" if number[0].isdigit() else "Bands"
+    text = CAPTIONS[number]
     return [f"**{title}**: {text}.", "", f"![{text}]({path.relative_to(out).as_posix()})", ""]
 
 
-def _row(*cells):
-    """A row of a table; bars inside its cells, as of |Q|, are escaped."""
-    return "| " + " | ".join(re.sub(r"(?<!\\)\|", "\\|", cell) for cell in cells) + " |"
+def _markdown(head, rows):
+    """Lines of a table; bars inside its cells, as of |Q|, are escaped."""
+    if not rows:
+        return ["Not run."]
+    lines = ["| " + " | ".join(re.sub(r"(?<!\\)\|", "\\|", cell) for cell in row) + " |" for row in (head, *rows)]
+    return [lines[0], "|---" * len(head) + "|", *lines[1:]]
+
+
+def _word(agrees):
+    return "yes" if agrees else "**no**"
 
 
 def _text(name):

@@ -1,12 +1,12 @@
-"""All runs of the published study: its cases and twin tunnels, other meshes of three of them, and what it does not state."""
+"""All runs of the published study: its cases and twin tunnels, on several meshes, and what it does not state."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-#: How much coarser than the scenes the mesh is on which unknowns are varied.
-COARSE = 2.0
-#: Where cases end: the last inflow mass [kg/m] that the source looks at in most of them, and in case 3 and the twin tunnels.
+#: How much coarser than those of the scenes the meshes are, of most cases and all unknowns, and between.
+COARSE, MIDDLE = 2.0, 1.4
+#: Where most cases end, and where case 3 and the twin tunnels do: inflow masses that the source looks at [kg/m].
 COMPARED, LAST = 1000.0, 2000.0
 OUTPUT = {"output.interval": 0.02, "output.snapshot_interval": 0.1}
 TOGETHER = (
@@ -33,6 +33,9 @@ def sizes(factor: float) -> dict:
 def plans(quick: bool = False) -> list[dict]:
     """Definitions of the studies, in the order in which they run; see :class:`coupling.studies.design.Study`.
 
+    Case 3 is on the mesh of its scene and on two others, the other cases are on one that is :data:`COARSE` times as
+    coarse, which moves forces by a hundredth; case 5 and the twin tunnels also on the one between.
+
     Parameters
     ----------
     quick : bool
@@ -41,28 +44,43 @@ def plans(quick: bool = False) -> list[dict]:
     whole, part = {"inflow_mass": LAST, "time": 20.0}, {"inflow_mass": COMPARED, "time": 10.0}
     others = [f"case-{k}" for k in (5, 1, 2, 4, 9, 10, 7, 8, 6)]
     scenes, coarse = ["case-3", *others, "twin-tunnels"], {f"discretisation.{k}": v for k, v in sizes(COARSE).items()}
-    cases = {"name": "cases", "design": "list", "backends": ["beam-spring", "continuum"],
-             "fixed": OUTPUT | (coarse if quick else {}),
-             "parameters": {"scene": scenes, "stop": [whole, *[part] * len(others), whole]}}  # fmt: skip
+    meshes = [sizes(COARSE if quick else 1.0)] + [sizes(COARSE)] * (len(scenes) - 1)
+    cases = {"name": "cases", "design": "list", "backends": ["beam-spring", "continuum"], "fixed": OUTPUT,
+             "parameters": {"scene": scenes, "stop": [whole, *[part] * len(others), whole],
+                            "discretisation": meshes}}  # fmt: skip
     if quick:
         return [cases]
-    coarse |= {"stop.inflow_mass": LAST, "stop.time": 60.0, "output.interval": 0.02, "output.snapshot_interval": 0.25}
-    ground = {
-        "soils.0.hydraulic_conductivity": [1e-3, 1e-2, 1e-5],
-        "soils.0.dilatancy_angle": [5.0, 2.0],
-        "soils.0": list(TOGETHER),
-    }
+    coarse |= OUTPUT | {"stop.inflow_mass": COMPARED, "stop.time": 12.0, "output.snapshot_interval": 0.25}
     return [
         cases,
         {"name": "meshes", "design": "list", "fixed": OUTPUT,
          "parameters": {"scene": ["case-3", "case-3", "twin-tunnels", "case-5"], "stop": [whole] * 3 + [part],
-                        "discretisation": [sizes(1.4), sizes(COARSE), sizes(1.4), sizes(1.4)]}},
+                        "discretisation": [sizes(MIDDLE), sizes(COARSE), sizes(MIDDLE), sizes(MIDDLE)]}},
         {"name": "unknowns", "design": "one-at-a-time", "scene": "case-3", "fixed": coarse,
          "parameters": {
              "soils.0.loose_porosity": [0.5, 0.6], "gate.corners": ["slipping"],
              "discretisation": [{"elements_across_gate": 2}, {"elements_across_gate": 8}, SOURCE_MESH],
-             "lining": ["floating", "elastic"], "tunnels.0": [ONE_LAYER], **ground}},
+             "lining": ["floating", "elastic"], "tunnels.0": [ONE_LAYER],
+             "soils.0.hydraulic_conductivity": [1e-3, 1e-2, 1e-5], "soils.0.dilatancy_angle": [5.0, 2.0],
+             "soils.0": list(TOGETHER)}},
         {"name": "twin-unknowns", "design": "one-at-a-time", "scene": "twin-tunnels", "fixed": coarse,
          "parameters": {"gate.angle": [90.0], "soils.0.hydraulic_conductivity": [1e-2],
                         "soils.0.dilatancy_angle": [5.0]}},
     ]  # fmt: skip
+
+
+def run_all(out: str | Path, quick=False, workers=None, scheduler=None, console=None) -> list[dict]:
+    """Run all studies into folders of their names; what is there already is not run again.
+
+    Returns
+    -------
+    list of dict
+        Of :func:`coupling.studies.stored.run_study`, one a study.
+    """
+    from rich.console import Console
+
+    from coupling.studies.design import load_study
+    from coupling.studies.stored import run_study
+
+    said = console if console is not None else Console(stderr=True, quiet=True)
+    return [run_study(load_study(plan), Path(out) / plan["name"], workers, scheduler, said) for plan in plans(quick)]

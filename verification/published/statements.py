@@ -1,4 +1,4 @@
-"""The statements of the published study on case 3 and the twin tunnels, each as a number that must lie in an interval."""
+"""The statements of the published study on case 3 and the twin tunnels, each a number that must lie in an interval."""
 
 from __future__ import annotations
 
@@ -61,7 +61,8 @@ def measured_initially(case: RunEvidence, states) -> dict[str, Found]:
     found["M invert"] = Found(float(first["bending_moment"].sel(theta=180, method="nearest")) / 1e3)
     axial = first["axial_force"].values / 1e3
     low, high = numbers["axial_force_range"]
-    found["N range"] = Found(max(abs(axial.min() / low - 1), abs(axial.max() / high - 1)), f"{axial.min():.0f}, {axial.max():.0f}")
+    off = max(abs(axial.min() / low - 1), abs(axial.max() / high - 1))
+    found["N range"] = Found(off, f"{axial.min():.0f}, {axial.max():.0f}")
     for letter, name in (("N", "axial_force"), ("Q", "shear_force"), ("M", "bending_moment")):
         values = np.abs(first[name].values) if letter == "Q" else first[name].values
         angle = float(first["theta"].values[values.argmax()])
@@ -87,7 +88,8 @@ def measured_while_gushing(case: RunEvidence, states) -> dict[str, Found]:
     found["joint 2"] = Found(1e3 * float(now["joint_rotation"].sel(joint=numbers["joint_open_outside"])))
     if states.sizes["time"] > 2:
         last = states.isel(time=2)
-        for key, name, pick in (("Q", "shear_force", _largest), ("M", "bending_moment", np.max), ("N", "axial_force", np.max)):
+        for key, name in (("Q", "shear_force"), ("M", "bending_moment"), ("N", "axial_force")):
+            pick = _largest if key == "Q" else np.max
             found[f"level {key}"] = Found(100 * float(pick(last[name].values) / pick(now[name].values) - 1))
         drift = [postprocess.pressure_ratio(case.of_gate, "water_pressure", m).values for m in (mass, LAST)]
         found["stable"] = Found(float(np.median(np.abs(drift[1] - drift[0]))))

@@ -24,8 +24,9 @@ NAMES = {
 }
 WORDS = {
     "hydraulic_conductivity": "conductivity {:g} m/s", "dilatancy_angle": "dilatancy {:g}°", "corners": "corner {}",
-    "loose_porosity": "loose porosity {:g}", "elements_across_gate": "{} elements across the gate", "lining": "lining {}",
-    "element_size": "mesh of the source", "angle": "gate at {:g}°", "lining_modulus": "as stiff as one layer of triangles",
+    "loose_porosity": "loose porosity {:g}", "elements_across_gate": "{} elements across the gate",
+    "element_size": "mesh of the source", "angle": "gate at {:g}°", "lining": "lining {}",
+    "lining_modulus": "lining as stiff as one layer of triangles",
 }  # fmt: skip
 
 
@@ -52,10 +53,9 @@ def finished(folder: str | Path) -> list[CaseRun]:
     if not (Path(folder) / STUDY_FILE).is_file():
         return []
     _, cases, _ = stored_cases(folder)
-    files = [(case, case_file(Path(folder), case)) for case in cases]
-    return [
-        CaseRun(case.changes, RunEvidence(case.scene, file.parent / RUN_FOLDER)) for case, file in files if file.is_file()
-    ]
+    there = [(case, case_file(Path(folder), case)) for case in cases]
+    there = [(case, file.parent / RUN_FOLDER) for case, file in there if file.is_file()]
+    return [CaseRun(case.changes, RunEvidence(case.scene, run)) for case, run in there]
 
 
 def told(changes: dict) -> str:
@@ -83,9 +83,7 @@ def changed_rings(ring) -> dict[str, list]:
     from structure.springs import limit_pressures
 
     normal, tangential = limit_pressures(ring.ground)
-    springs = [
-        {"limit_pressure_normal": share * normal, "limit_pressure_tangential": share * tangential} for share in STRENGTHS
-    ]
+    springs = [{"limit_pressure_normal": s * normal, "limit_pressure_tangential": s * tangential} for s in STRENGTHS]
     other_face = "outer_face" if ring.ground.slip_at == "centre_line" else "centre_line"
     return {
         "joint angles": moved,
@@ -114,6 +112,6 @@ def moved_by(runs: list[CaseRun], measure) -> dict[str, list[tuple[dict, dict]]]
 
 def moved_by_rings(case: RunEvidence, measure) -> dict[str, list[tuple[dict, dict]]]:
     """The same for rings and for the initial contact; measure: function of evidence and ring."""
-    base = measure(case, case.scene.ring)
-    pairs = {name: [(measure(case, ring), base) for ring in rings] for name, rings in changed_rings(case.scene.ring).items()}
+    base, changed = measure(case, case.scene.ring), changed_rings(case.scene.ring)
+    pairs = {name: [(measure(case, ring), base) for ring in rings] for name, rings in changed.items()}
     return pairs | {CONTACT: [(measure(RunEvidence(case.scene, case.folder), case.scene.ring), base)]}
