@@ -691,8 +691,9 @@ def check_scene(scene: object) -> None:
     ValueError
     """
     if not isinstance(scene, Scene):
-        hint = "give its .mpm" if hasattr(scene, "mpm") else "coupling.load_scene('quick').mpm is one"
-        raise ValueError(f"scene: must be an mpm.Scene, got a {type(scene).__name__}; {hint}")
+        raise ValueError(
+            f"scene: must be an mpm.Scene, got a {type(scene).__name__}; coupling.load_scene('quick') is one"
+        )
 
 
 def _physical_memory():

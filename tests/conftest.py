@@ -19,7 +19,7 @@ def quick_scene() -> coupling.Scene:
 @pytest.fixture(scope="session")
 def quick_mesh(quick_scene: coupling.Scene) -> Mesh:
     """Its mesh, a few thousand triangles."""
-    return build_mesh(quick_scene.mpm)
+    return build_mesh(quick_scene)
 
 
 @pytest.fixture(scope="module")

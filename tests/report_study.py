@@ -16,11 +16,11 @@ REASON = "no initial equilibrium <b>at all</b>; make the elements smaller"
 
 def synthetic_run(scene, folder, **_):
     """Stands for `coupling.run`: pressures grow with the friction angle; one case fails, one ends half way."""
-    soil, gate = scene.mpm.soils[0], scene.mpm.gate
+    soil, gate = scene.soils[0], scene.gate
     if gate.angle == 45.0 and soil.friction_angle == 35.0:
         raise RunFailed(REASON, 0.0, (0.0, -20.0))
     folder.mkdir(parents=True, exist_ok=True)
-    writer = datasets.RunWriter(folder / "run.nc", root_attributes(scene), scene.mpm, TwoTriangles())
+    writer = datasets.RunWriter(folder / "run.nc", root_attributes(scene), scene, TwoTriangles())
     for time in TIMES[:3] if gate.angle == 45.0 else TIMES:
         made = replace(moving_record(time), points=None)
         turn = np.radians(made.lining[0]["theta"] - gate.angle)

@@ -97,7 +97,7 @@ def moving_record(time):
 def write_run(path, scene=None, times=TIMES, models=("beam-spring", "continuum"), status="finished"):
     """File of a synthetic run; the second model is a ring of another theory of bending."""
     scene = make_quick_scene() if scene is None else scene
-    writer = datasets.RunWriter(path, root_attributes(scene), scene.mpm, TwoTriangles())
+    writer = datasets.RunWriter(path, root_attributes(scene), scene, TwoTriangles())
     for time in times:
         writer.append(moving_record(time))
     writer.close(status, wall_seconds=12.0, cpu_seconds=11.0)

@@ -158,13 +158,13 @@ def _scene(path):
         except (tomllib.TOMLDecodeError, UnicodeDecodeError):
             return {"kind": "not a file of this program", "facts": {"why": "no valid TOML"}}
         return {"kind": "TOML file that is no valid scene", "facts": {"why": str(error)}}
-    tunnels = ", ".join(f"{t.outer_diameter:g} m under {t.cover:g} m" for t in scene.mpm.tunnels)
-    gate = scene.mpm.gate
+    tunnels = ", ".join(f"{t.outer_diameter:g} m under {t.cover:g} m" for t in scene.tunnels)
+    gate = scene.gate
     return {
         "kind": "scene",
         "facts": {
             "name": scene.name,
-            "soils": ", ".join(soil.name for soil in scene.mpm.soils),
+            "soils": ", ".join(soil.name for soil in scene.soils),
             "tunnels": tunnels or "none",
             "gate": "none" if gate is None else f"{gate.width:g} m at {gate.angle:g} degrees",
         },

@@ -16,7 +16,7 @@ def scenes_command(json_path: JsonPath = None):
         from coupling.scenes.layers import scene_names
         from coupling.scenes.scene import load_scene
 
-        data = {"scenes": [_scene_row(load_scene(name).mpm) for name in scene_names()]}
+        data = {"scenes": [_scene_row(load_scene(name)) for name in scene_names()]}
         write_json(json_path, data)
         if str(json_path) != "-":
             table = Table("scene", "soil", "cover", "gate", "tunnels", "until")

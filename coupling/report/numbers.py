@@ -170,9 +170,9 @@ def initial_theory(scene, theta):
 
     scene : coupling.Scene or None;  theta : (n,) float64 [degree];  returns xarray.Dataset or None.
     """
-    if scene is None or len(scene.mpm.soils) != 1 or len(scene.mpm.tunnels) != 1:
+    if scene is None or len(scene.soils) != 1 or len(scene.tunnels) != 1:
         return None
-    s = scene.mpm
+    s = scene
     soil, tunnel = s.soils[0], s.tunnels[0]
     if s.water is not None and s.water.table_depth > 0:
         return None
@@ -194,8 +194,8 @@ def initial_theory(scene, theta):
 
 def ground_slips(scene):
     """Whether friction does not bear the shear of the theoretical state on the first lining: soil pressure differs."""
-    tunnel = scene.mpm.tunnels[0]
-    return scene.mpm.bond_friction(tunnel) > tunnel.friction_coefficient
+    tunnel = scene.tunnels[0]
+    return scene.bond_friction(tunnel) > tunnel.friction_coefficient
 
 
 def _ring_numbers(run, tunnel):

@@ -40,7 +40,7 @@ def section(scene, lining):
     return {
         "tunnels": [tunnel._asdict() for tunnel in (tunnel_list(lining) if has_tunnels(lining) else ())],
         "gate": None if gate is None else gate._asdict(),
-        "box": None if scene is None else {"width": scene.mpm.box.width, "depth": scene.mpm.box.depth},
-        "water_table": None if scene is None or scene.mpm.water is None else scene.mpm.water.table_depth,
-        "soils": [] if scene is None else [{"name": s.name, "top": s.top_depth} for s in scene.mpm.soils],
+        "box": None if scene is None else {"width": scene.box.width, "depth": scene.box.depth},
+        "water_table": None if scene is None or scene.water is None else scene.water.table_depth,
+        "soils": [] if scene is None else [{"name": s.name, "top": s.top_depth} for s in scene.soils],
     }

@@ -103,7 +103,7 @@ def _player(dataset, whole, extremes, chosen, rows, step, records):
             {
                 "number": case.index,
                 "label": labels[case.index],
-                "gate": None if case.scene.mpm.gate is None else case.scene.mpm.gate.angle,
+                "gate": None if case.scene.gate is None else case.scene.gate.angle,
                 **case_series(whole[case.index], extremes[case.index], step, records),
             }
             for case in chosen

@@ -30,7 +30,7 @@ def respond(scene: Scene, pressures: xr.Dataset, backend: str = "beam-spring", t
     structure.LiningFailure
         No equilibrium.
     """
-    number = gate_tunnel(scene.mpm) if tunnel is None else tunnel
+    number = gate_tunnel(scene) if tunnel is None else tunnel
     pressures = on_tunnel(pressures, number)
     try:
         ring = ring_of(scene, number)

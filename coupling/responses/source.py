@@ -72,9 +72,9 @@ def read_sources(path, scene=None):
     if "tunnel" not in pressures.dims:
         return [_source(file, is_run, pressures, root, own, chosen, None)]
     numbers = [None, *tunnels_beside(pressures)]
-    if chosen is not None and len(chosen.mpm.tunnels) < len(numbers):
+    if chosen is not None and len(chosen.tunnels) < len(numbers):
         raise RunFileError(
-            f"'{file}': holds {len(numbers)} tunnels, scene '{chosen.name}' has {len(chosen.mpm.tunnels)}; choose a "
+            f"'{file}': holds {len(numbers)} tunnels, scene '{chosen.name}' has {len(chosen.tunnels)}; choose a "
             "--scene with as many, or select a tunnel of the pressures"
         )
     return [_source(file, is_run, on_tunnel(pressures, k), root, own, chosen, k) for k in numbers]

@@ -53,18 +53,18 @@ def plan(
     import mpm
 
     scene = _checked(scene, warn)
-    mesh = mpm.build_mesh(scene.mpm)
-    solver = mpm.Solver(scene.mpm, mesh, threads)
+    mesh = mpm.build_mesh(scene)
+    solver = mpm.Solver(scene, mesh, threads)
     dt, limit = solver.time_step_estimate()
     rate = _measured_rate(solver)
-    stop = scene.mpm.stop
-    time, interval = expected_time(scene.mpm), scene.mpm.output.interval
+    stop = scene.stop
+    time, interval = expected_time(scene), scene.output.interval
     most = None if stop.time is None else _work(solver, dt, interval, stop.time)[0]
     steps, point_steps = _work(solver, dt, interval, time)
     return {
         "scene": scene.name,
         "features": features(scene, solver.threads, _why_alone(len(solver.mesh.elements), threads)),
-        "initial_k0": initial_k0(scene.mpm),
+        "initial_k0": initial_k0(scene),
         "elements": len(solver.mesh.elements),
         "nodes": len(solver.mesh.nodes),
         "points": int(solver.n_points),
@@ -91,7 +91,7 @@ def _checked(scene, warn):
     scene = as_scene(scene)
     for warning in warnings_of(scene):
         (warn if warn is not None else warn_in_python)(warning)
-    check_memory(scene.mpm)
+    check_memory(scene)
     return scene
 
 
@@ -158,27 +158,28 @@ def rough_plan(
 
     scene = _checked(scene, warn)
     check_threads(threads)
-    s = scene.mpm
-    elements, time = s.estimated_elements, expected_time(s)
-    sizes = [s.discretisation.element_size] + [s.discretisation.element_size_lining] * bool(s.tunnels)
-    if s.gate is not None:
-        sizes.append(s.gate.width / s.discretisation.elements_across_gate)
+    elements, time = scene.estimated_elements, expected_time(scene)
+    sizes = [scene.discretisation.element_size] + [scene.discretisation.element_size_lining] * bool(scene.tunnels)
+    if scene.gate is not None:
+        sizes.append(scene.gate.width / scene.discretisation.elements_across_gate)
     # between the altitude of an equilateral triangle and the flattest that the mesher lets pass
-    dt = s.numerics.courant * 0.6 * min(sizes) / max(_wave_speed(soil, s.water) for soil in s.soils)
+    dt = scene.numerics.courant * 0.6 * min(sizes) / max(_wave_speed(soil, scene.water) for soil in scene.soils)
     return {
         "scene": scene.name,
         "features": features(scene, threads_used(elements, threads), _why_alone(elements, threads)),
-        "initial_k0": initial_k0(s),
+        "initial_k0": initial_k0(scene),
         "elements": math.ceil(elements),
-        "points": math.ceil(elements * s.discretisation.points_per_element),
+        "points": math.ceil(elements * scene.discretisation.points_per_element),
         "dt": dt,
-        "stop_time": s.stop.time,
-        "stop_inflow_mass": s.stop.inflow_mass,
-        "steps_to_stop_time": None if s.stop.time is None else _rough_steps(dt, s.output.interval, s.stop.time),
+        "stop_time": scene.stop.time,
+        "stop_inflow_mass": scene.stop.inflow_mass,
+        "steps_to_stop_time": None
+        if scene.stop.time is None
+        else _rough_steps(dt, scene.output.interval, scene.stop.time),
         "expected_time": time,
-        "expected_steps": None if time is None else _rough_steps(dt, s.output.interval, time),
-        "records": None if time is None else 1 + _intervals(s.output.interval, time)[0],
-        "memory_bytes": math.ceil(s.estimated_bytes),
+        "expected_steps": None if time is None else _rough_steps(dt, scene.output.interval, time),
+        "records": None if time is None else 1 + _intervals(scene.output.interval, time)[0],
+        "memory_bytes": math.ceil(scene.estimated_bytes),
         "free_memory_bytes": free_memory_bytes(),
     }
 

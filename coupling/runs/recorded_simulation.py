@@ -104,7 +104,7 @@ class RecordedSimulation:
         log.info("scene %s, %s, revision %s", scene.name, attributes["source"], attributes["revision"] or "unknown")
         replace_file(self.folder / SCENE_FILE, attributes["scene"])
         self.report({"stage": "mesh"})
-        mesh = mpm.build_mesh(scene.mpm)
+        mesh = mpm.build_mesh(scene)
         mesh.save(self.folder / MESH_FILE)
         log.info("mesh: %s", ", ".join(f"{name} {value:.4g}" for name, value in mesh.quality.items()))
         self.mesh_sha256 = mesh_sha256(mesh)
@@ -116,9 +116,9 @@ class RecordedSimulation:
                 f"{about['mesh_sha256'][:12]} and is {self.mesh_sha256[:12]}; go back to the run's versions "
                 f"({remains.attributes['versions']}), or start a new run"
             )
-        self.simulation = mpm.Simulation(scene.mpm, mesh, self.threads, self.report)
+        self.simulation = mpm.Simulation(scene, mesh, self.threads, self.report)
         if remains is None or remains.attributes is None:
-            self.writer = RunWriter(path, attributes, scene.mpm, mesh)
+            self.writer = RunWriter(path, attributes, scene, mesh)
         else:
             kept = {"records": 0, "snapshots": 0} if about is None else about
             resumed = [
@@ -127,7 +127,7 @@ class RecordedSimulation:
             ]
             history = with_history(remains.attributes.get("history", ""), f"resumed after {kept['records']} records")
             self.writer = RunWriter.continued(
-                path, scene.mpm, kept["records"], kept["snapshots"], resumed=", ".join(resumed), history=history
+                path, scene, kept["records"], kept["snapshots"], resumed=", ".join(resumed), history=history
             )
         if about is None:
             remove_checkpoints(self.folder)
@@ -140,7 +140,7 @@ class RecordedSimulation:
 
     def _note_slip(self):
         """Store and tell what of the bonded initial state the lining's friction does not bear."""
-        share, scene = self.simulation.unborne_shear, self.scene.mpm
+        share, scene = self.simulation.unborne_shear, self.scene
         self.writer.attributes["initial_unborne_shear"] = share
         if share > MOST_UNBORNE:
             asked = max(scene.bond_friction(tunnel) for tunnel in scene.tunnels)

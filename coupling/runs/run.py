@@ -108,14 +108,14 @@ def run(
     if not resume:
         if given is None:
             raise Refused("scene: must be given unless a run is resumed; name a built-in one, as 'quick'")
-        check_memory(given.mpm)
+        check_memory(given)
         out = default_folder(given.name) if out is None else out
     held = reopened(out) if resume else claimed(out, overwrite)
     with held as folder, _logged_to(folder / LOG_FILE), _shown(progress) as report:
         remains = find_remains(folder, given, _teller(warn)) if resume else None
         if remains is not None:
             chosen: Scene = remains.scene
-            check_memory(chosen.mpm)
+            check_memory(chosen)
         else:
             chosen = given
             for warning in warnings_of(chosen):
@@ -129,7 +129,7 @@ def run(
             )
             pressures = simulation.run()
         failure = None
-        if (figures if response is None else response) and chosen.ring is not None and chosen.mpm.tunnels:
+        if (figures if response is None else response) and chosen.ring is not None and chosen.tunnels:
             report({"stage": "respond"})
             failure = _answered(chosen, folder / RUN_FILE, pressures)
         with opened(folder) as file:

@@ -1,11 +1,10 @@
 """The numbers of a scene that an engineer asks for first."""
 
 
-def facts(scene):
+def facts(s):
     """Numbers of a scene that an engineer asks for first: list of (what, value as text)."""
     from coupling.scenes.features import initial_k0_text
 
-    s = scene.mpm
     rows = [("box", f"{s.box.width:g} m wide, {s.box.depth:g} m deep")]
     rows.append(("water table", "dry ground" if s.water is None else f"{s.water.table_depth:g} m below the surface"))
     if s.is_undrained:
@@ -37,8 +36,8 @@ def facts(scene):
     rows.append(("until", " or ".join(stops)))
     d = s.discretisation
     rows.append(("elements", f"{d.element_size:g} m, at the lining {d.element_size_lining:g} m"))
-    if scene.ring is not None:
-        ring = scene.ring
+    if s.ring is not None:
+        ring = s.ring
         rows.append((
             "ring",
             f"{len(ring.joint_angles)} joints, thickness {1e3 * ring.thickness:g} mm, concrete E "

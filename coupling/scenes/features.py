@@ -15,7 +15,7 @@ def features(scene: Scene, threads: int, why_alone: str = "one thread") -> list[
 
     scene : coupling.Scene;  threads : int;  why_alone : str, the reason where it is one.
     """
-    s, numerics = scene.mpm, scene.mpm.numerics
+    s, numerics = scene, scene.numerics
     plastic = [soil.name for soil in s.soils if soil.model == "mohr-coulomb"]
     resting = [f"{t.friction_coefficient:g}" for t in s.tunnels if t.friction_coefficient > 0]
     resolved = s.gate is not None and s.interior == "resolved"

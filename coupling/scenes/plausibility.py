@@ -70,18 +70,16 @@ def warnings_of(scene: Scene) -> list[str]:
     ----------
     scene : coupling.Scene
     """
-    data = scene.mpm.model_dump(exclude_none=True)
-    if scene.ring is not None:
-        data["ring"] = scene.ring.model_dump(exclude_none=True)
+    data = scene.model_dump(exclude_none=True)
     told = [f"{shown(path)} {hint}" for path, hint in hints(data).items() if not _follows(path, data)]
     told += _other_rings(scene)
-    stop, output = scene.mpm.stop, scene.mpm.output
+    stop, output = scene.stop, scene.output
     if stop.time is not None and output.interval >= stop.time:
         told.append(
             f"output.interval {output.interval:g} s is not below stop.time {stop.time:g} s: only the first and the "
             f"last state are recorded; write e.g. {stop.time / 100:g}"
         )
-    return told + _narrow_box(scene.mpm)
+    return told + _narrow_box(scene)
 
 
 def warn_in_python(message: str) -> None:
@@ -113,11 +111,11 @@ def _narrow_box(scene):
 
 def _other_rings(scene):
     """Where a ring is taken for a tunnel of other diameters than those of [ring]."""
-    ring, own = scene.ring, gate_tunnel(scene.mpm)
+    ring, own = scene.ring, gate_tunnel(scene)
     return [
         f"tunnels[{k}] is not as wide as tunnel {own}, which [ring] describes: its ring is taken with the concrete and "
         "joints of [ring] and its own diameters; leave its forces aside if it is built otherwise"
-        for k, tunnel in enumerate(scene.mpm.tunnels)
+        for k, tunnel in enumerate(scene.tunnels)
         if ring is not None and k != own
         and (tunnel.outer_diameter, tunnel.inner_diameter) != (ring.outer_diameter, ring.inner_diameter)
     ]  # fmt: skip

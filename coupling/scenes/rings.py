@@ -43,13 +43,13 @@ def ring_of(scene: Scene, tunnel: int) -> Ring:
     """
     if scene.ring is None:
         raise SceneError(f"scene '{scene.name}': has no [ring]; add one to get internal forces")
-    own = gate_tunnel(scene.mpm)
+    own = gate_tunnel(scene)
     if tunnel == own:
         return scene.ring
-    there, home = scene.mpm.tunnels[tunnel], scene.mpm.tunnels[own]
+    there, home = scene.tunnels[tunnel], scene.tunnels[own]
     values = scene.ring.model_dump() | {"outer_diameter": there.outer_diameter, "inner_diameter": there.inner_diameter}
     if values["ground"] is not None and there.axis_depth != home.axis_depth:
-        values["ground"] |= ground_at_axis(scene.mpm, there.axis_depth)
+        values["ground"] |= ground_at_axis(scene, there.axis_depth)
     try:
         return Ring.model_validate(values)
     except ValidationError as error:

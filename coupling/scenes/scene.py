@@ -51,16 +51,10 @@ DERIVED = (
 )
 
 
-class Scene(Input):
-    """A complete scene: `mpm` for the ground and the gate, `ring` for the structure (None: no ring is computed)."""
+class Scene(Input, MpmScene):
+    """A complete scene: ground, tunnels and gate as `mpm.Scene`, and `ring` for the structure (None: no ring)."""
 
-    mpm: MpmScene
     ring: Ring | None = None
-
-    @property
-    def name(self) -> str:
-        """Name of the scene."""
-        return self.mpm.name
 
     def __repr__(self) -> str:
         from coupling.scenes.facts import facts
@@ -86,11 +80,9 @@ class Scene(Input):
 
     def nested(self) -> dict[str, Any]:
         """The scene as the nested dictionary of its complete TOML file, for :func:`make_scene`."""
-        data = self.mpm.model_dump(exclude_none=True, warnings=False)
-        if self.ring is not None:
-            data["ring"] = self.ring.model_dump(exclude_none=True, warnings=False)
-            if self.ring.ground is None:  # left out it would be derived
-                data["ring"]["ground"] = NONE
+        data = self.model_dump(exclude_none=True, warnings=False)
+        if self.ring is not None and self.ring.ground is None:  # left out it would be derived
+            data["ring"]["ground"] = NONE
         return data
 
     def changed(self, **changes: Any) -> "Scene":
@@ -108,15 +100,15 @@ class Scene(Input):
         """
         data = self.nested()
         if "ring" in data:
-            data["ring"] = _without(data["ring"], derived_ring(self.mpm))
+            data["ring"] = _without(data["ring"], derived_ring(self))
         check_levels(changes, f"changes of scene {self.name!r}")
         return make_scene(merged((*change_layers(changes), Layer(self.name, "", data))), self.name)
 
     @model_validator(mode="after")
-    def _check(self) -> "Scene":
-        gate, ring = self.mpm.gate, self.ring
+    def _check_ring(self) -> "Scene":
+        gate, ring = self.gate, self.ring
         if gate is not None and ring is not None:
-            tunnel = self.mpm.tunnels[gate.tunnel]
+            tunnel = self.tunnels[gate.tunnel]
             if (ring.outer_diameter, ring.inner_diameter) != (tunnel.outer_diameter, tunnel.inner_diameter):
                 raise ValueError(
                     f"ring: diameters must be those of tunnel {gate.tunnel} ({tunnel.outer_diameter:g} and "
@@ -164,6 +156,8 @@ def load_scene(name: str | Path, /, **changes: Any) -> Scene:
 def as_scene(scene: Any) -> Scene:
     """A valid scene from what a caller has: a scene, which is validated once more, or the name or file of one.
 
+    An `mpm.Scene` is a scene without a ring.
+
     Raises
     ------
     SceneError
@@ -171,19 +165,15 @@ def as_scene(scene: Any) -> Scene:
     """
     if isinstance(scene, str | Path):
         return load_scene(scene)
-    if isinstance(scene, MpmScene):
-        raise SceneError(
-            f"scene '{scene.name}': must be a coupling.Scene, got its part for the ground, an mpm.Scene; "
-            "give coupling.Scene(mpm=..), with ring=.. where forces in the ring are wanted"
-        )
     if isinstance(scene, dict):
         return make_scene(scene)
-    if not isinstance(scene, Scene):
+    if not isinstance(scene, MpmScene):
         raise SceneError(
             f"scene: must be a coupling.Scene, the name of a built-in one or a file, got {shortened(scene)}; "
             "load one: coupling.load_scene('quick')"
         )
-    return make_scene(scene.nested(), str(getattr(scene.mpm, "name", "scene")))
+    nested = scene.nested() if isinstance(scene, Scene) else scene.model_dump(exclude_none=True, warnings=False)
+    return make_scene(nested, str(getattr(scene, "name", "scene")))
 
 
 def parse_scene(text: str, origin: str) -> Scene:
@@ -230,9 +220,9 @@ def make_scene(data: dict[str, Any], origin: str = "scene", layers: tuple[Layer,
     problems = _truth_values(data, MpmScene, ())
     if isinstance(ring_data, dict):
         problems += _truth_values(ring_data, Ring, ("ring",))
-    mpm_scene = ring = None
+    ground = ring = None
     try:
-        mpm_scene = MpmScene.model_validate(data)
+        ground = MpmScene.model_validate(data)
     except ValidationError as error:
         problems += mistakes(error, MpmScene, extra_names=("ring", "base"), advice=ADVICE)
     if ring_data is not None:
@@ -241,7 +231,7 @@ def make_scene(data: dict[str, Any], origin: str = "scene", layers: tuple[Layer,
                 (("ring",), f"must be a table, got {shortened(ring_data)}; write [ring] with its keys below")
             )
         else:
-            derived = {} if mpm_scene is None else derived_ring(mpm_scene)
+            derived = {} if ground is None else derived_ring(ground)
             if ring_data.get("ground") == NONE:
                 ring_data = {**ring_data, "ground": None}
             ring_data, wrong = ring_in_si(ring_data)
@@ -252,9 +242,9 @@ def make_scene(data: dict[str, Any], origin: str = "scene", layers: tuple[Layer,
                 # Without a valid ground there is nothing to derive the missing keys from.
                 found = mistakes(error, Ring, silent=() if derived else DERIVED, advice=ADVICE)
                 problems += [(("ring", *location), message) for location, message in found]
-    if not problems and mpm_scene is not None:
+    if not problems and ground is not None:
         try:
-            return Scene.model_validate({"mpm": mpm_scene, "ring": ring})
+            return Scene.model_validate(data | {"ring": ring})
         except ValidationError as error:
             problems += mistakes(error, Scene)
     unusual = hints(whole)

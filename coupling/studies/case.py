@@ -76,7 +76,7 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, 
         responses[name] = answers[name, None]
     if answers:
         write_responses(run_folder / RUN_FILE, answers)
-    last = scene.mpm.stop.inflow_mass or float(history["inflow_mass"].values[-1])
+    last = scene.stop.inflow_mass or float(history["inflow_mass"].values[-1])
     result = at_inflow_masses(on_tunnel(pressures), history, responses, np.linspace(0.0, last, records))
     result.attrs = root_attributes(scene)
     with replaced(done) as beside:

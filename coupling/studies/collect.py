@@ -108,9 +108,9 @@ def unreadable(file: Path, error: Exception) -> str:
 
 def _of_scenes(cases):
     """Coordinates that tell scenes apart where the scene itself is a parameter."""
-    soils = [case.scene.mpm.soils[0] for case in cases]
-    tunnels = [case.scene.mpm.tunnels[:1] for case in cases]
-    gates = [case.scene.mpm.gate for case in cases]
+    soils = [case.scene.soils[0] for case in cases]
+    tunnels = [case.scene.tunnels[:1] for case in cases]
+    gates = [case.scene.gate for case in cases]
     columns = {
         "gate_angle": ([np.nan if gate is None else gate.angle for gate in gates], "degree", "angle of the gate"),
         "cover": ([t[0].cover if t else np.nan for t in tunnels], "m", "cover of the first tunnel"),

@@ -324,9 +324,9 @@ def check_backends(study: Study):
 
 def _value_in(scene, name):
     """Value of a complete scene at a dotted name, a K0 that is left out as it is used; None where it has none."""
-    value = scene.mpm.model_dump() | {"ring": None if scene.ring is None else scene.ring.model_dump()}
-    for soil, table in zip(scene.mpm.soils, value["soils"], strict=True):
-        lowest, highest = scene.mpm.lateral_pressure_range(soil)
+    value = scene.model_dump()
+    for soil, table in zip(scene.soils, value["soils"], strict=True):
+        lowest, highest = scene.lateral_pressure_range(soil)
         table["k0"] = highest if lowest == highest else None
     for part in name.split("."):
         try:

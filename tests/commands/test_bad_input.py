@@ -97,7 +97,7 @@ def test_line_is_that_on_which_the_statement_begins():
 
 
 def soil(**values):
-    return {"soils": [{**coupling.load_scene("quick").mpm.soils[0].model_dump(), **values}]}
+    return {"soils": [{**coupling.load_scene("quick").soils[0].model_dump(), **values}]}
 
 
 @pytest.mark.parametrize(

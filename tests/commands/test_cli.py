@@ -72,7 +72,7 @@ def test_values_of_the_scene_are_set_on_the_command_line(simulated, tmp_path):
     changes = ("--set", "gate.angle=45", "--set", "gate.width=15 cm", "--set", "soils.0.friction_angle=33")
     result = gush("run", "quick", *changes, "--out", tmp_path / "a", "--no-figures")
     assert result.exit_code == 0, result.output
-    scene = coupling.load_scene(tmp_path / "a" / "scene.toml").mpm
+    scene = coupling.load_scene(tmp_path / "a" / "scene.toml")
     assert (scene.gate.angle, scene.gate.width, scene.soils[0].friction_angle) == (45.0, 0.15, 33.0)
     refused = gush("run", "quick", "--set", "gate.angel=45", "--out", tmp_path / "b")
     assert refused.exit_code == 2 and "did you mean 'angle'" in refused.output and not (tmp_path / "b").exists()
@@ -179,7 +179,7 @@ def test_truncated_run_is_refused(simulated, tmp_path):
 def test_too_little_memory_is_refused(monkeypatch):
     monkeypatch.setattr("coupling.runs.memory.free_memory_bytes", lambda: 1_000_000)
     with pytest.raises(Refused, match="raise element_size"):
-        check_memory(make_quick_scene().mpm)
+        check_memory(make_quick_scene())
 
 
 def test_failed_run_keeps_its_output_and_says_where(simulated, tmp_path):
@@ -241,7 +241,7 @@ def test_plan_says_what_is_left_out_and_why(tmp_path):
 
 
 def test_plan_says_which_lining_moves():
-    scene = coupling.load_scene("twin-tunnels").mpm
+    scene = coupling.load_scene("twin-tunnels")
     held, ring = scene.tunnels[0], scene.tunnels[1].model_copy(update={"lining": "elastic"})
     mixed = coupling.load_scene("twin-tunnels", tunnels=[t.model_dump(exclude_none=True) for t in (held, ring)])
     line = next(row for row in features(mixed, 1) if row["feature"] == "motion of the lining")

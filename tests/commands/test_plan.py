@@ -39,7 +39,7 @@ def test_planned_steps_of_a_gate_that_gushes_are_within_a_half_of_those_that_are
 def test_expected_time_of_case_3_is_that_of_its_runs(inflow_mass, time):
     # docs/case-3-sensitivity.md, the mesh of the scene; a fifth: one share of free discharge for all of it
     scene = coupling.load_scene("case-3", stop={"inflow_mass": inflow_mass})
-    assert expected_time(scene.mpm) == pytest.approx(time, rel=0.2)
+    assert expected_time(scene) == pytest.approx(time, rel=0.2)
 
 
 def test_plan_tells_the_threads_and_why_it_is_one_with_and_without_a_mesh(monkeypatch):

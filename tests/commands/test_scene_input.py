@@ -25,7 +25,7 @@ CASES = {
 
 def edited(name, table, **values):
     """`table` of a built-in scene with other values, first entry where it is a list."""
-    data = getattr(coupling.load_scene(name).mpm, table)
+    data = getattr(coupling.load_scene(name), table)
     if isinstance(data, tuple):
         return {table: [{**data[0].model_dump(), **values}, *(entry.model_dump() for entry in data[1:])]}
     return {table: values}
@@ -39,19 +39,19 @@ def test_built_in_scenes_are_quick_the_ten_cases_and_the_twin_tunnels():
 def test_cases_are_the_published_ones(name):
     scene = coupling.load_scene(name)
     angle, cohesion, friction, modulus, cover = CASES[name]
-    soil, tunnel = scene.mpm.soils[0], scene.mpm.tunnels[0]
+    soil, tunnel = scene.soils[0], scene.tunnels[0]
     assert scene.name == name
-    assert (scene.mpm.gate.angle, scene.mpm.gate.width) == (angle, 0.2)
+    assert (scene.gate.angle, scene.gate.width) == (angle, 0.2)
     assert (soil.cohesion, soil.friction_angle, soil.youngs_modulus) == (cohesion, friction, modulus)
     assert (soil.porosity, soil.grain_density, soil.poissons_ratio) == (0.45, 2650, 0.3)
     assert (tunnel.cover, tunnel.outer_diameter, tunnel.inner_diameter, tunnel.x) == (cover, 6.6, 5.9, 0)
-    assert (scene.mpm.box.width, scene.mpm.box.depth) == (100, 50)
-    assert (scene.mpm.water.density, scene.mpm.water.bulk_modulus) == (1000, 80e6)
-    assert scene.mpm.stop.inflow_mass == 2000
+    assert (scene.box.width, scene.box.depth) == (100, 50)
+    assert (scene.water.density, scene.water.bulk_modulus) == (1000, 80e6)
+    assert scene.stop.inflow_mass == 2000
 
 
 def test_twin_tunnels_are_the_published_case_study():
-    scene = coupling.load_scene("twin-tunnels").mpm
+    scene = coupling.load_scene("twin-tunnels")
     left, right = scene.tunnels
     assert (right.x - left.x, left.cover, right.cover, scene.box.width) == (pytest.approx(12.8), 23.1, 23.1, 80)
 
@@ -89,23 +89,23 @@ def test_base_may_be_a_file_beside_the_scene(tmp_path, monkeypatch):
     (tmp_path / "mine.toml").write_text('base = "quick"\n[gate]\nangle = 10.0\n')
     (tmp_path / "other.toml").write_text('base = "mine.toml"\n[gate]\nwidth = 0.3\n')
     monkeypatch.chdir("/")
-    gate = coupling.load_scene(tmp_path / "other.toml").mpm.gate
+    gate = coupling.load_scene(tmp_path / "other.toml").gate
     assert (gate.angle, gate.width) == (10, 0.3)
 
 
 def test_scene_can_not_be_changed():
     scene = coupling.load_scene("quick")
     with pytest.raises(ValidationError):
-        scene.mpm.gate.angle = 10
+        scene.gate.angle = 10
     with pytest.raises(ValidationError):
-        scene.mpm = None
+        scene.ring = None
 
 
 def test_strings_with_units_are_converted():
     changes = edited(
         "quick", "soils", youngs_modulus="40 MPa", hydraulic_conductivity="0.1 mm/s", friction_angle="0.5 rad"
     )
-    soil = coupling.load_scene("quick", **changes).mpm.soils[0]
+    soil = coupling.load_scene("quick", **changes).soils[0]
     assert soil.youngs_modulus == pytest.approx(40e6) and soil.hydraulic_conductivity == pytest.approx(1e-4)
     assert soil.friction_angle == pytest.approx(math.degrees(0.5))
 
@@ -166,7 +166,7 @@ def test_more_harmonics_than_the_lining_has_pairs_of_elements_are_refused():
 
 
 def test_overlapping_tunnels_are_refused():
-    tunnel = coupling.load_scene("quick").mpm.tunnels[0].model_dump()
+    tunnel = coupling.load_scene("quick").tunnels[0].model_dump()
     with pytest.raises(SceneError, match="tunnels: 0 and 1 must lie apart"):
         coupling.load_scene("quick", tunnels=[tunnel, {**tunnel, "x": 6.0}])
 
@@ -197,7 +197,7 @@ def test_all_mistakes_are_named_at_once():
 
 
 def test_missing_physical_number_is_not_filled_in():
-    soil = coupling.load_scene("quick").mpm.soils[0].model_dump()
+    soil = coupling.load_scene("quick").soils[0].model_dump()
     for key, message in (
         ("hydraulic_conductivity", "soil 'sand': hydraulic_conductivity must be given where there is water"),
         ("porosity", r"soils\[0\]: porosity missing"),
@@ -207,7 +207,7 @@ def test_missing_physical_number_is_not_filled_in():
 
 
 def test_scene_made_in_python_meets_the_same_checks():
-    data = coupling.load_scene("quick").mpm.model_dump()
+    data = coupling.load_scene("quick").model_dump(exclude={"ring"})
     data["soils"][0]["porosity"] = 45
     with pytest.raises(ValidationError, match=r"porosity .*got 45; give a fraction, not percent"):
         MpmScene(**data)
@@ -250,12 +250,12 @@ def test_folder_is_no_scene_file(tmp_path):
 def test_one_value_of_a_list_is_changed_by_its_dotted_name(tmp_path):
     base = coupling.load_scene("quick")
     scene = coupling.load_scene("quick", **{"soils.0.friction_angle": 33, "gate.angle": "0.5 rad"})
-    assert scene.mpm.soils[0] == base.mpm.soils[0].model_copy(update={"friction_angle": 33.0})
-    assert scene.mpm.gate.angle == pytest.approx(math.degrees(0.5))
+    assert scene.soils[0] == base.soils[0].model_copy(update={"friction_angle": 33.0})
+    assert scene.gate.angle == pytest.approx(math.degrees(0.5))
     # the same in a file, whose lines are named
     path = tmp_path / "mine.toml"
     path.write_text('base = "quick"\n[soils.0]\nfriction_angle = 33\n')
-    assert coupling.load_scene(path).mpm.soils == scene.mpm.soils
+    assert coupling.load_scene(path).soils == scene.soils
     path.write_text('base = "quick"\n[soils.0]\nporosity = 45\n')
     with pytest.raises(SceneError, match=r"line 3: soils\[0\]\.porosity"):
         coupling.load_scene(path)
@@ -299,7 +299,7 @@ def test_every_number_of_a_ring_has_a_unit_or_is_one():
 def test_byte_order_mark_of_an_editor_is_no_mistake(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text('base = "quick"\n[gate]\nangle = 10.0\n', encoding="utf-8-sig")
-    assert coupling.load_scene(path).mpm.gate.angle == 10
+    assert coupling.load_scene(path).gate.angle == 10
     path.write_text("joint_dislocation = 6e-3\n", encoding="utf-8-sig")
     assert structure.Limits.from_toml(path).joint_dislocation == 6e-3
 
@@ -330,7 +330,7 @@ def test_changes_of_the_command_line_are_read_as_a_scene_says_them():
 
 
 def with_soil(**values):
-    return coupling.load_scene("quick", **edited("quick", "soils", **values)).mpm
+    return coupling.load_scene("quick", **edited("quick", "soils", **values))
 
 
 @pytest.mark.parametrize(("k0", "borne"), [(0.405, False), (0.406, True), (1.0, True), (2.463, True), (2.465, False)])
@@ -361,7 +361,7 @@ def test_k0_that_cohesion_bears_near_the_surface_only_is_refused_with_the_depth(
 
 @pytest.mark.parametrize("name", coupling.scene_names())
 def test_built_in_scene_begins_with_a_stress_that_its_soils_bear(name):
-    scene = coupling.load_scene(name).mpm
+    scene = coupling.load_scene(name)
     for soil in scene.soils:
         vertical = scene.vertical_stress(scene.box.depth)
         lowest, highest = soil.admissible_k0(vertical)

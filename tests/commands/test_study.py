@@ -41,7 +41,7 @@ def made_up(source, folder, backends, records, threads):
     """What `run_case` writes, from a formula: the moment is K0 times the angle; K0 = 0.6 at 60 degrees fails."""
     import tomllib
 
-    scene = coupling.make_scene(tomllib.loads(source)).mpm
+    scene = coupling.make_scene(tomllib.loads(source))
     angle, k0 = scene.gate.angle, scene.soils[0].lateral_pressure_coefficient(1.0)
     if k0 == 0.6 and angle == 60.0:
         raise RuntimeError("made to fail")
@@ -63,7 +63,7 @@ def suicidal(source, folder, backends, records, threads):
     """Kills its worker the first time, and always at 60 degrees with K0 = 0.6."""
     import tomllib
 
-    scene = coupling.make_scene(tomllib.loads(source)).mpm
+    scene = coupling.make_scene(tomllib.loads(source))
     mark = folder + ".seen"
     doomed = scene.soils[0].k0 == 0.6 and scene.gate.angle == 60.0
     if doomed or not os.path.exists(mark):
@@ -107,7 +107,7 @@ def test_designs_give_their_combinations():
 
 def test_parameters_reach_the_scene_and_what_follows_from_it():
     stiff = cases(load_study({"name": "s", "parameters": {"soils.0.youngs_modulus": [4e7, 8e7], "scene": ["case-1"]}}))
-    assert [c.scene.mpm.soils[0].youngs_modulus for c in stiff] == [4e7, 8e7]
+    assert [c.scene.soils[0].youngs_modulus for c in stiff] == [4e7, 8e7]
     assert [c.scene.ring.ground.youngs_modulus for c in stiff] == [4e7, 8e7]  # derived from the soil
     assert stiff[0].scene.name == "case-1" and stiff[0].key != stiff[1].key
     again = cases(load_study({"name": "other", "parameters": {"soils.0.youngs_modulus": [4e7], "scene": ["case-1"]}}))
@@ -126,7 +126,7 @@ def test_parameters_reach_the_scene_and_what_follows_from_it():
 
 def test_fixed_values_hold_in_every_case():
     plan = load_study(TINY | {"fixed": {"stop.inflow_mass": 7.0}})
-    assert {case.scene.mpm.stop.inflow_mass for case in cases(plan)} == {7.0}
+    assert {case.scene.stop.inflow_mass for case in cases(plan)} == {7.0}
     with pytest.raises(StudyError, match="must not vary"):
         load_study(TINY | {"fixed": {"gate.angle": 7.0}})
 

@@ -15,7 +15,7 @@ from verification.synthetic_run import lining, make_quick_scene, record
 
 def write(path, times, status="finished", scene=None, **options):
     scene = make_quick_scene() if scene is None else scene
-    writer = datasets.RunWriter(path, root_attributes(scene), scene.mpm)
+    writer = datasets.RunWriter(path, root_attributes(scene), scene)
     for time in times:
         writer.append(record(time, snapshot=True, **options))
     writer.close(status, "as asked")
@@ -139,7 +139,7 @@ import coupling
 from coupling import datasets
 from coupling.files.provenance import root_attributes
 scene = make_quick_scene()
-writer = datasets.RunWriter({str(path)!r}, root_attributes(scene), scene.mpm)
+writer = datasets.RunWriter({str(path)!r}, root_attributes(scene), scene)
 for k in range(5):
     writer.append(record(0.1 * k, snapshot=True))
     writer.flush()
@@ -164,7 +164,7 @@ def test_batch_cut_short_before_its_times_is_not_shown(tmp_path):
 
 def test_interrupted_write_is_repeated_in_the_same_rows(tmp_path, monkeypatch):
     scene = make_quick_scene()
-    writer = datasets.RunWriter(tmp_path / "run.nc", root_attributes(scene), scene.mpm)
+    writer = datasets.RunWriter(tmp_path / "run.nc", root_attributes(scene), scene)
     writer.append(record(0.0))
     with monkeypatch.context() as patch:
         patch.setattr(writer, "_write_history", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
@@ -178,14 +178,14 @@ def test_interrupted_write_is_repeated_in_the_same_rows(tmp_path, monkeypatch):
 
 def test_motion_of_linings_is_written_beside_their_pressures(tmp_path):
     source = make_quick_scene()
-    changes = [t.model_dump(exclude_none=True) for t in source.mpm.tunnels]
+    changes = [t.model_dump(exclude_none=True) for t in source.tunnels]
     scene = make_quick_scene(tunnels=[changes[0] | {"lining": "elastic"}])
     made = record(0.5)
     theta = made.lining[0]["theta"]
     angle = np.radians(theta)
     made.lining[0] |= {"displacement_radial": 3e-3 * np.cos(angle), "displacement_tangential": -3e-3 * np.sin(angle)}
     made.lining[0] |= dict.fromkeys(datasets.RING_FORCES, 1e5 * np.cos(2 * angle))
-    writer = datasets.RunWriter(tmp_path / "run.nc", root_attributes(scene), scene.mpm)
+    writer = datasets.RunWriter(tmp_path / "run.nc", root_attributes(scene), scene)
     writer.append(made)
     writer.close("finished")
     group = datasets.read_group(tmp_path / "run.nc", "lining").isel(time=0)

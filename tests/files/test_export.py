@@ -35,7 +35,7 @@ def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("runs") / "a"
     made.mkdir()
     scene = make_quick_scene()
-    writer = datasets.RunWriter(made / "run.nc", root_attributes(scene), scene.mpm, Square())
+    writer = datasets.RunWriter(made / "run.nc", root_attributes(scene), scene, Square())
     for time in TIMES:
         shot = record(time, snapshot=True)
         # one point leaves at every time, so that their number changes
@@ -208,7 +208,7 @@ def test_export_refuses_what_it_cannot_do(folder, tmp_path):
     (tmp_path / "file").write_text("")
     assert "is a file" in gush("export", folder, "--out", tmp_path / "file").output
     scene = make_quick_scene()
-    writer = datasets.RunWriter(tmp_path / "run.nc", root_attributes(scene), scene.mpm)
+    writer = datasets.RunWriter(tmp_path / "run.nc", root_attributes(scene), scene)
     writer.append(record(0.0))
     writer.close("finished")
     refused = gush("export", tmp_path / "run.nc")

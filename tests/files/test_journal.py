@@ -30,7 +30,7 @@ def cut_short(monkeypatch, name, share):
 def file(tmp_path):
     """A run file of two records."""
     scene = make_quick_scene()
-    writer = datasets.RunWriter(tmp_path / "run.nc", root_attributes(scene), scene.mpm)
+    writer = datasets.RunWriter(tmp_path / "run.nc", root_attributes(scene), scene)
     for time in (0.0, 0.5):
         writer.append(record(time, snapshot=True))
     writer.flush()

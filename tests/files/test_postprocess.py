@@ -37,7 +37,7 @@ def test_straight_line_has_full_linearity_and_a_parabola_has_not():
 @pytest.fixture(scope="module")
 def event():
     """Mesh and last snapshot of the scene `quick` at 40 kg/m, as the run file would hold them."""
-    scene = coupling.load_scene("quick").mpm
+    scene = coupling.load_scene("quick")
     scene = scene.model_copy(update={"stop": mpm.scene.Stop(inflow_mass=40.0, time=1.0)})
     mesh = mpm.build_mesh(scene)
     *_, last = mpm.simulate(scene, mesh)

@@ -34,9 +34,9 @@ from coupling.postprocess import at_inflow
 
 reveal_type(coupling.run("quick", out="run"))
 reveal_type(coupling.read_run("run"))
-reveal_type(coupling.load_scene("quick").mpm.gate)
+reveal_type(coupling.load_scene("quick").gate)
 reveal_type(at_inflow(read_response("run"), 50.0))
-reveal_type(next(mpm.simulate(coupling.load_scene("quick").mpm)))
+reveal_type(next(mpm.simulate(coupling.load_scene("quick"))))
 reveal_type(structure.lining_model("continuum"))
 reveal_type(coupling.__version__)
 coupling.run(figures="all")

@@ -18,7 +18,7 @@ def run(tmp_path_factory):
     """File of a synthetic run with a response."""
     path = tmp_path_factory.mktemp("run") / "run.nc"
     scene = make_quick_scene()
-    writer = datasets.RunWriter(path, root_attributes(scene), scene.mpm, TwoTriangles())
+    writer = datasets.RunWriter(path, root_attributes(scene), scene, TwoTriangles())
     for time in (0.0, 0.5, 1.0):
         writer.append(record(time, snapshot=True))
     writer.close("finished")

@@ -219,9 +219,9 @@ def test_runs_without_ring_or_with_one_record_or_two_tunnels_have_a_page(browser
     assert "'interrupted'" in browser.evaluate("document.querySelector('.warnings').innerText")
     assert browser.evaluate("document.querySelectorAll('#player [data-chart] > svg').length") == 5
     twin = coupling.load_scene("twin-tunnels")
-    writer = datasets.RunWriter(tmp_path / "twin.nc", root_attributes(twin), twin.mpm)
+    writer = datasets.RunWriter(tmp_path / "twin.nc", root_attributes(twin), twin)
     for time in (0.0, 1.0):
-        made = record(time, n_tunnels=len(twin.mpm.tunnels))
+        made = record(time, n_tunnels=len(twin.tunnels))
         for k, part in enumerate(made.lining):
             part["soil_pressure"] = part["soil_pressure"] * (1 + k)
         writer.append(made)

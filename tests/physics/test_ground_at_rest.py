@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def closed_case_3():
-    scene = coupling.load_scene("case-3", initial_contact="bonded").mpm
+    scene = coupling.load_scene("case-3", initial_contact="bonded")
     solver = mpm.Solver(scene, mpm.build_mesh(scene))
     solver.relax()
     return scene, solver
@@ -59,7 +59,7 @@ def test_lining_carries_the_uplift_of_the_displaced_ground(closed_case_3):
 
 
 def test_ground_with_a_rough_lining_stays_at_rest():
-    source = coupling.load_scene("quick").mpm
+    source = coupling.load_scene("quick")
     rough = source.tunnels[0].model_copy(update={"friction_coefficient": 0.6})  # K0 shear needs 0.44
     scene = source.model_copy(update={"tunnels": (rough,)})
     solver = mpm.Solver(scene, mpm.build_mesh(scene))
@@ -91,11 +91,11 @@ def by_place(solver):
 
 @pytest.mark.parametrize("depth", [0.0, 10.0])
 def test_two_soils_stay_at_rest_below_a_lowered_water_table(depth):
-    soil = coupling.load_scene("quick").mpm.soils[0].model_dump() | {"hydraulic_conductivity": 1e-7}
+    soil = coupling.load_scene("quick").soils[0].model_dump() | {"hydraulic_conductivity": 1e-7}
     lower = {"name": "lower", "top_depth": 31.0, "youngs_modulus": 8e7, "porosity": 0.38, "k0": 0.5}
     scene = coupling.load_scene(
         "quick", gate="none", soils=[soil, soil | lower], water={"table_depth": depth}, discretisation=COARSE
-    ).mpm
+    )
     rough = scene.tunnels[0].model_copy(update={"friction_coefficient": 0.6})
     scene = scene.model_copy(update={"tunnels": (rough,)})
     solver = mpm.Solver(scene, mpm.build_mesh(scene))

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 
 
 def quick(**changes):
-    return coupling.load_scene("quick").mpm.model_copy(update=changes)
+    return coupling.load_scene("quick").model_copy(update=changes)
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +58,7 @@ def test_flow_zone_grows(event):
 
 
 def test_result_has_the_same_bits_for_any_number_of_threads_and_of_steps_at_once():
-    scene = coupling.load_scene("quick").mpm
+    scene = coupling.load_scene("quick")
     mesh = mpm.build_mesh(scene)
     solvers, batches = [], []
     for threads, most_substeps in ((1, 1), (2, math.inf), (4, 100)):
@@ -81,7 +81,7 @@ def test_result_has_the_same_bits_for_any_number_of_threads_and_of_steps_at_once
 
 
 def test_gate_on_the_left_mirrors_the_gate_on_the_right():
-    scene = coupling.load_scene("quick").mpm
+    scene = coupling.load_scene("quick")
     mesh = mpm.build_mesh(scene)
     left = scene.model_copy(update={"gate": scene.gate.model_copy(update={"angle": 270.0})})
     pressures = []

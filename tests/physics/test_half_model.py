@@ -22,7 +22,7 @@ EVENT = 1e-7
 def scene(angle=0.0, **changes):
     """The small event with the gate on the mirror line, or without a gate."""
     gate = "none" if angle is None else {"angle": angle}
-    return small_scene(gate=gate, **changes).mpm
+    return small_scene(gate=gate, **changes)
 
 
 #: Ground that sticks to the lining and is far from yielding: slip and the active state multiply last bits by more.
@@ -156,10 +156,10 @@ def test_half_model_fits_layers_above_beside_and_below_the_tunnel():
 )
 def test_scene_that_is_not_symmetric_is_computed_whole_and_half_is_refused(changes, reason):
     crown = {"gate": {"angle": 0.0}}
-    assert not small_scene(**(crown | changes)).mpm.is_half
+    assert not small_scene(**(crown | changes)).is_half
     with pytest.raises(coupling.SceneError, match=f"symmetry: 'half' must mirror the scene in x = 0, got .*{reason}"):
         small_scene(**(crown | changes), symmetry="half")
-    assert not small_scene(**crown, symmetry="whole").mpm.is_half and small_scene(**crown).mpm.is_half
+    assert not small_scene(**crown, symmetry="whole").is_half and small_scene(**crown).is_half
 
 
 def test_mesh_whose_triangles_cross_the_mirror_line_is_refused():

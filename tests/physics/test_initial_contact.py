@@ -10,7 +10,7 @@ from coupling.scenes.features import features
 from coupling.scenes.layers import scene_names
 from verification.small_event import small_scene
 
-QUICK = coupling.load_scene("quick").mpm
+QUICK = coupling.load_scene("quick")
 
 
 def slit(k0, friction=0.2, initial_contact="bonded", **changes):
@@ -35,7 +35,7 @@ def shear_and_friction(solver):
 
 
 def test_bonded_ground_beyond_friction_slips_before_the_gate_opens_and_stays_after():
-    simulation = mpm.Simulation(slit(0.43).mpm, threads=1)
+    simulation = mpm.Simulation(slit(0.43), threads=1)
     first = simulation.begin().lining[0]
     # of the shear of K0 stress on a circle 0.358 is beyond friction; the polygon has 50 sides
     assert simulation.unborne_shear == pytest.approx(share_beyond(0.43, 0.2), rel=0.02)
@@ -52,7 +52,7 @@ def test_bonded_ground_beyond_friction_slips_before_the_gate_opens_and_stays_aft
 def test_slipped_bond_is_the_frictional_state_of_a_held_lining():
     shears = []
     for contact in ("bonded", "frictional"):
-        simulation = mpm.Simulation(slit(0.43, initial_contact=contact).mpm, threads=1)
+        simulation = mpm.Simulation(slit(0.43, initial_contact=contact), threads=1)
         shears.append(simulation.begin().lining[0]["soil_shear"])
     assert simulation.unborne_shear == 0
     assert np.abs(shears[0] - shears[1]).max() < 1e-3 * np.abs(shears[1]).max()
@@ -61,17 +61,17 @@ def test_slipped_bond_is_the_frictional_state_of_a_held_lining():
 @pytest.mark.parametrize(("k0", "friction"), [(1.0, 0.0), (0.577, 0.29)])
 def test_bonded_ground_that_friction_bears_is_left_as_it_is(k0, friction):
     scene = slit(k0, friction)
-    simulation = mpm.Simulation(scene.mpm, threads=1)
+    simulation = mpm.Simulation(scene, threads=1)
     simulation.begin()
     assert simulation.unborne_shear == 0
-    alone = mpm.Solver(scene.mpm, simulation.solver.mesh, threads=1)
+    alone = mpm.Solver(scene, simulation.solver.mesh, threads=1)
     alone.relax()
     np.testing.assert_array_equal(alone.points, simulation.solver.points)
 
 
 @pytest.mark.parametrize("k0", [0.43, 0.577, 1.0, 2.0])
 def test_friction_that_bears_the_bond_is_the_largest_of_shear_over_pressure(k0):
-    scene = slit(k0).mpm
+    scene = slit(k0)
     a = np.linspace(0.0, np.pi, 100_001)
     ratio = (1 - k0) * np.sin(a) * np.cos(a) / (np.cos(a) ** 2 + k0 * np.sin(a) ** 2)
     assert scene.bond_friction(scene.tunnels[0]) == pytest.approx(np.abs(ratio).max(), abs=1e-8)
@@ -98,7 +98,7 @@ def test_plan_says_whether_the_ground_slips(friction, slips):
 
 @pytest.mark.parametrize("name", scene_names())
 def test_built_in_scenes_bear_most_of_the_bond_or_ask_for_friction(name):
-    scene = coupling.load_scene(name).mpm
+    scene = coupling.load_scene(name)
     shares = [
         share_beyond(k0, tunnel.friction_coefficient)
         for soil in scene.soils for k0 in scene.lateral_pressure_range(soil) for tunnel in scene.tunnels

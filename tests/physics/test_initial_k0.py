@@ -31,7 +31,7 @@ NAMES = ["never yields", "loose sand", "soft clay", "stiff clay"]
 
 def ground(soil, **changes):
     """The small scene without a gate and with a lining so rough that it holds any shear."""
-    rough = coupling.load_scene("quick").mpm.tunnels[0].model_dump() | {"friction_coefficient": 2.0}
+    rough = coupling.load_scene("quick").tunnels[0].model_dump() | {"friction_coefficient": 2.0}
     changes = {"gate": "none", "tunnels": [rough], "stop": {"time": 0.05}, **changes}
     return small_scene(**changes, **{f"soils.0.{key}": value for key, value in soil.items()})
 
@@ -49,10 +49,10 @@ def test_k0_left_out_is_that_of_gravity_loading_bit_for_bit(model, angle):
         small_scene(gate={"angle": angle}, **{"soils.0.k0": k0, "soils.0.model": model})
         for k0 in ("none", 0.3 / (1 - 0.3))
     )
-    assert left_out.mpm.is_half == (angle == 180.0)
+    assert left_out.is_half == (angle == 180.0)
     assert left_out.ring == given.ring
-    mesh = mpm.build_mesh(left_out.mpm)
-    states = [mpm.Solver(scene.mpm, mesh, threads=1) for scene in (left_out, given)]
+    mesh = mpm.build_mesh(left_out)
+    states = [mpm.Solver(scene, mesh, threads=1) for scene in (left_out, given)]
     for solver in states:
         solver.relax()
         solver.open_gate()
@@ -63,7 +63,7 @@ def test_k0_left_out_is_that_of_gravity_loading_bit_for_bit(model, angle):
 
 @pytest.mark.parametrize("soil", SOILS, ids=NAMES)
 def test_initial_horizontal_stress_is_elastic_or_at_the_yield_surface(soil):
-    scene = ground(soil).mpm
+    scene = ground(soil)
     points, _, _ = fill(mpm.build_mesh(scene), scene)
     vertical, _ = initial_stress(scene, -points[:, Y])
     elastic = soil["poissons_ratio"] / (1 - soil["poissons_ratio"]) * vertical
@@ -79,7 +79,7 @@ def test_initial_horizontal_stress_is_elastic_or_at_the_yield_surface(soil):
 @pytest.mark.parametrize("soil", SOILS, ids=NAMES)
 @pytest.mark.parametrize("drainage", ["two-phase", "undrained"])
 def test_ground_that_begins_at_the_yield_surface_stays_at_rest(soil, drainage):
-    scene = ground(soil, water={"drainage": drainage}).mpm
+    scene = ground(soil, water={"drainage": drainage})
     solver = mpm.Solver(scene, mpm.build_mesh(scene), threads=1)
     assert solver.relax()[0] == 1
     before = solver.points.copy()
@@ -99,7 +99,7 @@ def test_ground_that_begins_at_the_yield_surface_stays_at_rest(soil, drainage):
 def test_cohesion_lowers_the_least_horizontal_stress():
     vertical = 200e3
     stresses = [
-        ground(LOOSE_SAND | {"cohesion": cohesion}).mpm.soils[0].lateral_pressure_coefficient(vertical) * vertical
+        ground(LOOSE_SAND | {"cohesion": cohesion}).soils[0].lateral_pressure_coefficient(vertical) * vertical
         for cohesion in (0.0, 10e3, 20e3, 60e3)
     ]
     # 2 c tan(45 - phi/2) each
@@ -111,7 +111,7 @@ def test_cohesion_lowers_the_least_horizontal_stress():
 
 
 def test_undrained_clay_differs_by_twice_its_strength_at_most():
-    scene = ground(SOFT_CLAY).mpm
+    scene = ground(SOFT_CLAY)
     soil = scene.soils[0]
     # (1 - 3/7) s_v = 2 c
     depth = 2 * 30e3 / (4 / 7 * BUOYANT)
@@ -141,7 +141,7 @@ def test_theory_of_the_initial_pressures_needs_one_k0_beside_the_tunnel():
 
 def test_friction_that_bears_the_bond_is_of_the_k0_in_force():
     for soil in SOILS:
-        scene = ground(soil).mpm
+        scene = ground(soil)
         tunnel = scene.tunnels[0]
         depth = np.linspace(tunnel.cover, tunnel.cover + tunnel.outer_diameter, 1001)
         vertical = BUOYANT * depth
@@ -149,7 +149,7 @@ def test_friction_that_bears_the_bond_is_of_the_k0_in_force():
         k0 = np.maximum(elastic, least_horizontal(soil, vertical) / vertical)
         assert scene.bond_friction(tunnel) == pytest.approx((np.abs(1 - k0) / (2 * np.sqrt(k0))).max(), rel=1e-9)
     # nothing presses from the side: no friction bears that
-    weightless = ground({"model": "elastic", "poissons_ratio": 0.0}).mpm
+    weightless = ground({"model": "elastic", "poissons_ratio": 0.0})
     assert math.isinf(weightless.bond_friction(weightless.tunnels[0]))
 
 
@@ -157,7 +157,7 @@ def test_plan_and_scene_say_which_k0_is_in_force_and_why():
     def told(soil):
         scene = ground(soil)
         (feature,) = (row for row in features(scene, 1) if row["feature"] == "K0 of gravity loading")
-        (row,) = initial_k0(scene.mpm)
+        (row,) = initial_k0(scene)
         assert rough_plan(scene)["initial_k0"] == [row]
         said = feature["reason"].removeprefix("sand: ")
         assert said in str(scene)
@@ -183,19 +183,19 @@ def test_given_k0_beyond_the_strength_is_refused_still(soil):
 def test_k0_of_the_base_is_left_out_again(tmp_path):
     (tmp_path / "given.toml").write_text('base = "quick"\n[soils.0]\nk0 = 0.577\n')
     (tmp_path / "mine.toml").write_text('base = "given.toml"\n[soils.0]\nk0 = "none"\n')
-    assert coupling.load_scene(tmp_path / "given.toml").mpm.soils[0].k0 == 0.577
+    assert coupling.load_scene(tmp_path / "given.toml").soils[0].k0 == 0.577
     scene = coupling.load_scene(tmp_path / "mine.toml")
     assert scene == coupling.load_scene("quick") and "k0" not in scene.source
     assert coupling.scenes.scene.parse_scene(scene.source, "again") == scene
 
 
 def test_k0_of_layers_is_that_of_each():
-    soil = coupling.load_scene("quick").mpm.soils[0].model_dump(exclude_none=True)
+    soil = coupling.load_scene("quick").soils[0].model_dump(exclude_none=True)
     layers = [soil, soil | LOOSE_SAND | {"name": "loose", "top_depth": 15.0},
               soil | SOFT_CLAY | {"name": "clay", "top_depth": 30.0, "k0": 0.9}]  # fmt: skip
     scene = small_scene(soils=layers)
-    assert [row["source"] for row in initial_k0(scene.mpm)] == ["gravity loading", "yield surface", "given"]
-    points, _, soil_of_point = fill(mpm.build_mesh(scene.mpm), scene.mpm)
+    assert [row["source"] for row in initial_k0(scene)] == ["gravity loading", "yield surface", "given"]
+    points, _, soil_of_point = fill(mpm.build_mesh(scene), scene)
     ratio = points[:, SXX] / points[:, SYY]
     for number, k0 in enumerate((3 / 7, least_horizontal(LOOSE_SAND, 1.0), 0.9)):
         np.testing.assert_allclose(ratio[soil_of_point == number], k0, rtol=1e-12)

@@ -32,7 +32,7 @@ import mpm
 import mpm.contact, mpm.meeting, mpm.points, mpm.spectrum, mpm.stages
 import sys; sys.path.insert(0, "tests")
 from verification.small_event import small_scene
-scene = small_scene().mpm
+scene = small_scene()
 solver = mpm.Solver(scene, mpm.build_mesh(scene), threads=1)
 solver.relax()
 solver.open_gate()

@@ -16,12 +16,12 @@ GRADED = {**COARSE, "size_growth": 0.3}
 
 def elastic_scene(wet, **numerics):
     """The small scene with soil that never fails, nothing that damps, and a mesh from 0.08 to 4 m."""
-    soil = coupling.load_scene("quick").mpm.soils[0].model_dump() | {"model": "elastic"}
+    soil = coupling.load_scene("quick").soils[0].model_dump() | {"model": "elastic"}
     undamped = {"pic_rate": 0.0, "pressure_filter": 0.0, "relaxation_tolerance": 1e-3}
     changes = {} if wet else {"water": "none"}
     return coupling.load_scene(
         "quick", soils=[soil], discretisation=GRADED, numerics=undamped | numerics, **changes
-    ).mpm  # fmt: skip
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")

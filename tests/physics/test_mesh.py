@@ -23,7 +23,7 @@ ROUND_OFF = 1e-12
 
 def changed(scene, **changes) -> Scene:
     """The scene with other tables."""
-    data = scene.model_dump()
+    data = scene.model_dump(exclude={"ring"})
     for key, value in changes.items():
         data[key] = {**data[key], **value} if isinstance(value, dict) and isinstance(data[key], dict) else value
     return Scene(**data)
@@ -87,7 +87,7 @@ def test_every_cell_is_crossed_by_its_diagonals(quick_mesh):
 
 
 def test_boundary_is_that_of_box_and_lining_and_nothing_else(quick_scene, quick_mesh):
-    mesh, tunnel = quick_mesh, quick_scene.mpm.tunnels[0]
+    mesh, tunnel = quick_mesh, quick_scene.tunnels[0]
     middle = mesh.nodes[check_cells(mesh)].mean(axis=1)
     radius = np.hypot(middle[:, 0] - tunnel.x, middle[:, 1] + tunnel.axis_depth)
     sides = [abs(middle[:, 0] - x) < 1e-9 for x in (-50.0, 50.0)]
@@ -97,7 +97,7 @@ def test_boundary_is_that_of_box_and_lining_and_nothing_else(quick_scene, quick_
 
 
 def test_triangles_are_counter_clockwise_and_fill_every_region(quick_scene, quick_mesh):
-    scene, mesh = quick_scene.mpm, quick_mesh
+    scene, mesh = quick_scene, quick_mesh
     area = areas(mesh.nodes, mesh.elements)
     assert area.min() > 0
     by_region = {region: area[mesh.region == region].sum() for region in (SOIL, CHANNEL, INTERIOR, HEADROOM)}
@@ -114,7 +114,7 @@ def test_triangles_are_counter_clockwise_and_fill_every_region(quick_scene, quic
 
 
 def test_lining_nodes_lie_on_the_circles_at_their_angles(quick_scene, quick_mesh):
-    mesh, tunnel = quick_mesh, quick_scene.mpm.tunnels[0]
+    mesh, tunnel = quick_mesh, quick_scene.tunnels[0]
     nodes, theta = mesh.outer_nodes[0], np.radians(mesh.outer_theta[0])
     axis = np.array([tunnel.x, -tunnel.axis_depth])
     direction = np.column_stack([np.sin(theta), np.cos(theta)])
@@ -135,7 +135,7 @@ def test_faces_and_walls_are_mesh_edges(quick_mesh):
 
 
 def test_gate_corners_and_walls_are_a_strip_of_the_gate_width(quick_scene, quick_mesh):
-    scene, mesh = quick_scene.mpm, quick_mesh
+    scene, mesh = quick_scene, quick_mesh
     tunnel, width = scene.tunnels[0], scene.gate.width
     _, tangent = gate_axes(scene.gate.angle)
     axis = np.array([tunnel.x, -tunnel.axis_depth])
@@ -148,7 +148,7 @@ def test_gate_corners_and_walls_are_a_strip_of_the_gate_width(quick_scene, quick
 
 
 def test_tributary_arcs_are_symmetric_about_the_gate(quick_scene, quick_mesh):
-    offset = (quick_mesh.outer_theta[0] - quick_scene.mpm.gate.angle + 180) % 360 - 180
+    offset = (quick_mesh.outer_theta[0] - quick_scene.gate.angle + 180) % 360 - 180
     clockwise, counter_clockwise = np.sort(offset[offset > 1e-9]), np.sort(-offset[offset < -1e-9])
     # The node opposite the gate is at -180 only. The rest: to the error of the integration that places the nodes.
     np.testing.assert_allclose(counter_clockwise[:-1], clockwise, rtol=1e-5)
@@ -156,7 +156,7 @@ def test_tributary_arcs_are_symmetric_about_the_gate(quick_scene, quick_mesh):
 
 
 def test_box_sides_hold_the_nodes_of_the_box_sides(quick_scene, quick_mesh):
-    scene, mesh = quick_scene.mpm, quick_mesh
+    scene, mesh = quick_scene, quick_mesh
     x, y = mesh.nodes.T
     half, top = scene.box.width / 2, scene.discretisation.element_size
     assert set(mesh.left) == set(np.flatnonzero(x == -half)) and set(mesh.right) == set(np.flatnonzero(x == half))
@@ -173,7 +173,7 @@ def test_ground_surface_is_a_mesh_line(quick_mesh):
 
 
 def test_size_at_the_gate_follows_the_elements_across_and_grows_linearly(quick_scene):
-    scene = quick_scene.mpm
+    scene = quick_scene
     tunnel, d = scene.tunnels[0], scene.discretisation
     at_gate = scene.gate.width / d.elements_across_gate
     size = element_size(scene, tunnel.x + tunnel.outer_radius + np.array([0.0, 1.0, 40.0]), -tunnel.axis_depth)
@@ -193,7 +193,7 @@ def test_quality_reports_the_smallest_altitude(quick_mesh):
 @pytest.mark.parametrize("name", ["case-1", "case-2", "case-3", "case-4", "case-5", "case-9", "quick", "twin-tunnels"])
 @pytest.mark.slow
 def test_built_in_scenes_have_no_flat_triangle_and_the_gate_sets_the_smallest(name):
-    scene = coupling.load_scene(name).mpm
+    scene = coupling.load_scene(name)
     mesh = build_mesh(scene)
     check_cells(mesh)
     assert lowest(scene, mesh) > 0.25
@@ -202,7 +202,7 @@ def test_built_in_scenes_have_no_flat_triangle_and_the_gate_sets_the_smallest(na
 
 
 def test_meshing_the_largest_case_takes_seconds():
-    scene = coupling.load_scene("case-3").mpm
+    scene = coupling.load_scene("case-3")
     build_mesh(scene)  # loads what it needs
     begin = time.process_time()
     build_mesh(scene)
@@ -211,7 +211,7 @@ def test_meshing_the_largest_case_takes_seconds():
 
 @pytest.mark.parametrize("name", ["case-1", "case-3", "quick", "twin-tunnels"])
 def test_estimated_elements_are_those_of_the_mesh_within_a_fifth(name):
-    scene = coupling.load_scene(name).mpm
+    scene = coupling.load_scene(name)
     computed = len(build_mesh(scene).elements) / (2 if scene.is_half else 1)
     assert scene.estimated_elements == pytest.approx(computed, rel=0.2)
 
@@ -231,7 +231,7 @@ def test_altitude_of_a_right_triangle():
 
 
 def test_mesh_twice_is_the_same_bit_for_bit(quick_scene, quick_mesh):
-    again = build_mesh(quick_scene.mpm)
+    again = build_mesh(quick_scene)
     assert all(same(getattr(again, f.name), getattr(quick_mesh, f.name)) for f in fields(Mesh))
 
 
@@ -244,7 +244,7 @@ def test_mirrored_mesh_is_the_mesh_seen_from_behind(quick_scene, quick_mesh):
     check_cells(mirror)
     assert mirror.gate_angle == 360 - mesh.gate_angle
     assert np.all(mirror.nodes[mirror.left, 0] == mirror.nodes[:, 0].min())
-    tunnel = quick_scene.mpm.tunnels[0]
+    tunnel = quick_scene.tunnels[0]
     theta = np.radians(mirror.outer_theta[0])
     assert np.all(np.diff(mirror.outer_theta[0]) > 0)
     np.testing.assert_allclose(
@@ -289,25 +289,25 @@ def test_truncated_mesh_file_is_refused(quick_mesh, tmp_path):
 
 
 def test_sink_ends_at_the_inner_face(quick_scene):
-    mesh = build_mesh(changed(quick_scene.mpm, interior="sink"))
+    mesh = build_mesh(changed(quick_scene, interior="sink"))
     assert set(np.unique(mesh.region)) == {SOIL, CHANNEL, HEADROOM} and len(mesh.inner_nodes) == 0
 
 
 def test_without_gate_there_is_neither_channel_nor_interior(quick_scene):
-    mesh = build_mesh(changed(quick_scene.mpm, gate=None, stop={"time": 1.0}))
+    mesh = build_mesh(changed(quick_scene, gate=None, stop={"time": 1.0}))
     assert set(np.unique(mesh.region)) == {SOIL, HEADROOM}
     assert len(mesh.corner_nodes) == len(mesh.wall_nodes) == len(mesh.opening_nodes) == 0
     assert {0.0, 90.0, 180.0, 270.0} <= set(mesh.outer_theta[0])
 
 
 def test_level_ground_without_tunnels_is_a_rectangle(quick_scene):
-    mesh = build_mesh(changed(quick_scene.mpm, gate=None, tunnels=(), stop={"time": 1.0}))
+    mesh = build_mesh(changed(quick_scene, gate=None, tunnels=(), stop={"time": 1.0}))
     area = areas(mesh.nodes, mesh.elements)
     assert area[mesh.region == SOIL].sum() == pytest.approx(100.0 * 50.0, rel=ROUND_OFF)
 
 
 def test_soil_layer_boundaries_are_mesh_lines_also_where_they_meet_the_lining(quick_scene):
-    scene = quick_scene.mpm
+    scene = quick_scene
     layer = scene.soils[0].model_dump()
     depths = (7.3, 22.0)
     mesh = build_mesh(changed(scene, soils=[layer, *({**layer, "top_depth": depth} for depth in depths)]))
@@ -326,7 +326,7 @@ def crossed_levels(mesh, heights):
 @pytest.mark.parametrize("angle", [0.0, 90.0, 137.0])
 @pytest.mark.parametrize("depth", [2.5, 10.0, 22.9, 30.0])
 def test_ground_water_table_is_a_mesh_line_interrupted_by_the_lining(quick_scene, angle, depth):
-    scene = changed(quick_scene.mpm, water={"table_depth": depth}, gate={"angle": angle})
+    scene = changed(quick_scene, water={"table_depth": depth}, gate={"angle": angle})
     mesh = build_mesh(scene)
     check_cells(mesh)
     assert crossed_levels(mesh, [-depth]) == [0]
@@ -335,9 +335,9 @@ def test_ground_water_table_is_a_mesh_line_interrupted_by_the_lining(quick_scene
 
 @pytest.mark.parametrize("table", [0.5, 7.5, 20.1, 23.3, 26.4])
 def test_water_table_beside_another_line_the_gate_or_the_crown_spoils_no_cells(quick_scene, table):
-    layer = quick_scene.mpm.soils[0].model_dump()
+    layer = quick_scene.soils[0].model_dump()
     soils = [layer, {**layer, "top_depth": 7.3}]
-    scene = changed(quick_scene.mpm, soils=soils, water={"table_depth": table})
+    scene = changed(quick_scene, soils=soils, water={"table_depth": table})
     mesh = build_mesh(scene)
     assert lowest(scene, mesh) > 0.2
     assert crossed_levels(mesh, [-7.3]) == [0] and crossed_levels(mesh, [-table])[0] > 0
@@ -345,15 +345,15 @@ def test_water_table_beside_another_line_the_gate_or_the_crown_spoils_no_cells(q
 
 @pytest.mark.parametrize("depths", [(24.4, 26.0), (2.0, 3.5), (10.0, 10.5)])
 def test_layers_thinner_than_an_element_have_two_rows_of_cells(quick_scene, depths):
-    layer = quick_scene.mpm.soils[0].model_dump()
-    scene = changed(quick_scene.mpm, soils=[layer, *({**layer, "top_depth": depth} for depth in depths)])
+    layer = quick_scene.soils[0].model_dump()
+    scene = changed(quick_scene, soils=[layer, *({**layer, "top_depth": depth} for depth in depths)])
     mesh = build_mesh(scene)
     check_cells(mesh)
     assert crossed_levels(mesh, [-depth for depth in depths]) == [0] * len(depths)
 
 
 def test_layer_through_the_gate_is_refused(quick_scene):
-    scene = quick_scene.mpm
+    scene = quick_scene
     layer = scene.soils[0].model_dump()
     soils = [layer, {**layer, "top_depth": scene.tunnels[0].axis_depth + 0.02}]
     with pytest.raises(MeshError, match="gate: must not touch a soil layer boundary"):
@@ -361,18 +361,16 @@ def test_layer_through_the_gate_is_refused(quick_scene):
 
 
 def test_layer_that_leaves_a_sliver_above_the_crown_is_refused_with_its_place(quick_scene):
-    scene = quick_scene.mpm
+    scene = quick_scene
     layer = scene.soils[0].model_dump()
     with pytest.raises(MeshError, match=r"flattest near x = .* y = -(20|19.99)"):
         build_mesh(changed(scene, soils=[layer, {**layer, "top_depth": 19.99}]))
 
 
 def test_twin_tunnels_have_a_ring_of_nodes_each():
-    scene = coupling.load_scene(
-        "twin-tunnels", discretisation=coupling.load_scene("quick").mpm.discretisation.model_dump()
-    )
-    mesh = build_mesh(scene.mpm)
-    for tunnel, nodes in zip(scene.mpm.tunnels, mesh.outer_nodes, strict=True):
+    scene = coupling.load_scene("twin-tunnels", discretisation=coupling.load_scene("quick").discretisation.model_dump())
+    mesh = build_mesh(scene)
+    for tunnel, nodes in zip(scene.tunnels, mesh.outer_nodes, strict=True):
         radius = np.hypot(mesh.nodes[nodes, 0] - tunnel.x, mesh.nodes[nodes, 1] + tunnel.axis_depth)
         np.testing.assert_allclose(radius, tunnel.outer_radius, rtol=1e-13)
     assert len(mesh.corner_nodes) == 2
@@ -380,9 +378,9 @@ def test_twin_tunnels_have_a_ring_of_nodes_each():
 
 @pytest.mark.parametrize("gap", [0.3, 2.0])
 def test_tunnels_close_to_each_other_can_be_meshed(quick_scene, gap):
-    tunnel = quick_scene.mpm.tunnels[0].model_dump()
+    tunnel = quick_scene.tunnels[0].model_dump()
     x = tunnel["outer_diameter"] / 2 + gap / 2
-    scene = changed(quick_scene.mpm, tunnels=[{**tunnel, "x": -x}, {**tunnel, "x": x}])
+    scene = changed(quick_scene, tunnels=[{**tunnel, "x": -x}, {**tunnel, "x": x}])
     mesh = build_mesh(scene)
     check_cells(mesh)
     assert lowest(scene, mesh) > 0.2 and len(mesh.outer_nodes) == 2
@@ -390,7 +388,7 @@ def test_tunnels_close_to_each_other_can_be_meshed(quick_scene, gap):
 
 @pytest.mark.parametrize("cover", [0.5, 2.0])
 def test_shallow_tunnel_can_be_meshed(quick_scene, cover):
-    scene = changed(quick_scene.mpm, tunnels=[{**quick_scene.mpm.tunnels[0].model_dump(), "cover": cover}])
+    scene = changed(quick_scene, tunnels=[{**quick_scene.tunnels[0].model_dump(), "cover": cover}])
     mesh = build_mesh(scene)
     check_cells(mesh)
     assert lowest(scene, mesh) > 0.15
@@ -410,7 +408,7 @@ COARSE = {"element_size": 4.0, "element_size_lining": 0.8, "element_size_interio
 @pytest.mark.slow
 def test_any_gate_can_be_meshed(quick_scene, angle, width, across, interior, coarse):
     sizes = {"elements_across_gate": across} | (COARSE if coarse else {})
-    scene = changed(quick_scene.mpm, gate={"angle": angle, "width": width}, discretisation=sizes, interior=interior)
+    scene = changed(quick_scene, gate={"angle": angle, "width": width}, discretisation=sizes, interior=interior)
     mesh = build_mesh(scene)
     check_cells(mesh)
     assert lowest(scene, mesh) > 0.15

@@ -152,7 +152,7 @@ def deep_scene():
         "quick", water="none", gate="none", lining="elastic", initial_contact="bonded", ring="none", gravity=0.1,
         box={"width": 80.0, "depth": 80.0}, stop={"time": 1.0}, numerics={"relaxation_tolerance": 0.02},
         discretisation={"element_size": 9.0, "element_size_lining": 0.3, "size_growth": 0.3},
-    ).mpm  # fmt: skip
+    )  # fmt: skip
     soil = scene.soils[0].model_copy(update={"model": "elastic", "youngs_modulus": 5e6})
     tunnel = scene.tunnels[0].model_copy(
         update={"cover": 36.7, "inner_diameter": 6.54, "lining_modulus": 1e13, "lining_harmonics": 4}
@@ -221,7 +221,7 @@ def test_reactions_follow_the_wall_as_their_derivatives_say(wet):
 
 
 def solver_of(kind, density=DENSITY, **changes):
-    scene = small_scene(lining=kind, **{"initial_contact": "bonded"} | changes).mpm
+    scene = small_scene(lining=kind, **{"initial_contact": "bonded"} | changes)
     tunnel = scene.tunnels[0].model_copy(update={"lining_density": density, "lining_harmonics": 6})
     scene = scene.model_copy(update={"tunnels": (tunnel,)})
     return mpm.Solver(scene, mpm.build_mesh(scene), threads=1)
@@ -301,7 +301,7 @@ def test_light_and_heavy_linings_are_stable(kind, density):
 
 
 def test_mirrored_gate_moves_an_elastic_lining_as_its_mirror_image():
-    right = small_scene(lining="elastic", numerics={"relaxation_tolerance": 1e-4}).mpm
+    right = small_scene(lining="elastic", numerics={"relaxation_tolerance": 1e-4})
     tunnel = right.tunnels[0].model_copy(update={"lining_harmonics": 6})
     right = right.model_copy(update={"tunnels": (tunnel,)})
     left = right.model_copy(update={"gate": right.gate.model_copy(update={"angle": 270.0})})

@@ -121,7 +121,7 @@ def test_jet_at_rest_keeps_the_error_that_it_made():
 
 
 def test_sink_takes_momentum_and_water_that_are_accounted_for():
-    records = list(simulate(small_scene(interior="sink").mpm))
+    records = list(simulate(small_scene(interior="sink")))
     last = records[-1]
     assert last.inflow_mass > 30.0  # taken out at the inner end of the channel
     # water of 30 kg/m of grains is 10 kg/m; left out of the account it would be lost, all of it

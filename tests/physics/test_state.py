@@ -31,12 +31,12 @@ STATE = {*ARRAYS, *NUMBERS, "gate_open", "_mapped", "_limits", "mode"}
 @pytest.fixture(scope="module", params=["resolved", "sink", "altitude", "one step for all", "elastic lining"])
 def scene(request):
     if request.param == "altitude":
-        return small_scene(numerics={"critical_step": "altitude"}).mpm
+        return small_scene(numerics={"critical_step": "altitude"})
     if request.param == "one step for all":
-        return small_scene(numerics={"local_time_stepping": False}).mpm
+        return small_scene(numerics={"local_time_stepping": False})
     if request.param == "elastic lining":
-        return small_scene(lining="elastic").mpm
-    return small_scene(interior=request.param).mpm
+        return small_scene(lining="elastic")
+    return small_scene(interior=request.param)
 
 
 @pytest.fixture(scope="module")
@@ -126,6 +126,6 @@ def test_every_attribute_of_the_solver_is_stored_built_or_scratch(scene, mesh):
 
 
 def test_state_of_another_mesh_is_refused(scene, whole):
-    coarser = small_scene(discretisation={"element_size": 4.0}).mpm
+    coarser = small_scene(discretisation={"element_size": 4.0})
     with pytest.raises(ValueError, match="points must be"):
         mpm.Simulation(coarser).restore(whole[1][0][1])

@@ -9,7 +9,7 @@ from verification.small_event import small_scene
 
 def steps_of(scene):
     """Records of an event, and of each of its calls: inflow before and after [kg/m], length [s], step possible [s]."""
-    simulation = mpm.Simulation(scene.mpm, threads=1)
+    simulation = mpm.Simulation(scene, threads=1)
     records, calls = [simulation.begin()], []
     solver, advance = simulation.solver, simulation.solver.advance
 

@@ -126,7 +126,7 @@ def test_even_stress_pushes_no_inner_node_however_points_are_shared_among_triang
 
 @pytest.fixture(scope="module")
 def gushing():
-    scene = coupling.load_scene("quick").mpm
+    scene = coupling.load_scene("quick")
     simulation = mpm.Simulation(scene, threads=1)
     simulation.begin()
     while not simulation.done:

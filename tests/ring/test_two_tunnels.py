@@ -73,7 +73,7 @@ def test_both_tunnels_are_drawn_and_read_with_the_run(run):
 
 
 def test_a_tunnel_of_another_diameter_has_a_ring_of_its_own(run):
-    tunnels = [tunnel.model_dump() for tunnel in coupling.load_scene("twin-tunnels").mpm.tunnels]
+    tunnels = [tunnel.model_dump() for tunnel in coupling.load_scene("twin-tunnels").tunnels]
     tunnels[0] |= {"outer_diameter": 5.0, "inner_diameter": 4.4, "cover": 15.0}
     scene = coupling.load_scene("twin-tunnels", tunnels=tunnels, gate={"tunnel": GATE, "angle": 270.0})
     small, own = ring_of(scene, 0), ring_of(scene, GATE)

@@ -102,7 +102,7 @@ def test_command_writes_page_data_and_pictures(tmp_path, monkeypatch):
 def test_refined_scene_keeps_the_gate_in_whole_elements():
     scene = coupling.load_scene("case-3")
     changes = refined(scene, 0.5**0.5)
-    finer = coupling.load_scene("case-3", discretisation=changes).mpm.discretisation
+    finer = coupling.load_scene("case-3", discretisation=changes).discretisation
     assert finer.elements_across_gate == 11 and finer.element_size == pytest.approx(0.75 * 0.5**0.5)
     assert refined(scene, 4.0)["elements_across_gate"] == 2
 

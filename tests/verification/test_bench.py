@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def solver():
-    scene = small_scene().mpm
+    scene = small_scene()
     return prepared(scene, mpm.build_mesh(scene))
 
 
@@ -52,7 +52,7 @@ def test_slope_is_that_of_a_power_law():
 
 
 def test_configurations_differ_in_what_they_leave_out():
-    whole = small_scene().mpm
+    whole = small_scene()
     scenes = dict(configurations(whole))
     assert scenes["dry, elastic"].water is None
     assert {soil.model for soil in scenes["two-phase, elastic"].soils} == {"elastic"}

@@ -64,7 +64,7 @@ def test_numbers_on_the_page_are_those_of_the_datasets(rehearsal):
     scene = coupling.load_scene("case-3")
     ours = {row["statement"]: row["ours"] for row in data["answers"]}
     # initial moments are of the bonded state: within the coarse mesh's error of theory loads, not of the slipped record
-    theory = coupling.responses.respond.respond(scene, initial_theory(scene, scene.mpm.tunnels[0]).assign(
+    theory = coupling.responses.respond.respond(scene, initial_theory(scene, scene.tunnels[0]).assign(
         soil_shear=theoretical_shear(scene)).expand_dims(time=[0.0]))  # fmt: skip
     expected = theory["joint_bending_moment"].values[0, 1] / 1e3
     assert float(ours["initial M, joint 2 [kN m/m]"]) == pytest.approx(expected, rel=0.1)
@@ -72,12 +72,12 @@ def test_numbers_on_the_page_are_those_of_the_datasets(rehearsal):
 
 def theoretical_shear(scene):
     """Shear of the undisturbed ground on the circle (theta) [Pa]."""
-    soil = scene.mpm.soils[0]
-    buoyant = scene.mpm.gravity * (1 - soil.porosity) * (soil.grain_density - scene.mpm.water.density)
+    soil = scene.soils[0]
+    buoyant = scene.gravity * (1 - soil.porosity) * (soil.grain_density - scene.water.density)
     loads = theoretical_pressures(
         outer_diameter=6.6, cover=20.0, buoyant_unit_weight=buoyant, coefficient_at_rest=3 / 7
     )
-    theta = initial_theory(scene, scene.mpm.tunnels[0])["theta"]
+    theta = initial_theory(scene, scene.tunnels[0])["theta"]
     return loads["soil_shear"].isel(time=0, drop=True).interp(theta=theta)
 
 
@@ -96,7 +96,7 @@ def test_bonded_ground_at_rest_has_the_theoretical_pressures(tmp_path):
     scene = coupling.load_scene("case-3", **FIXED)
     first = at_rest(scene, tmp_path / "rest.nc").isel(time=0)
     again = at_rest(scene, tmp_path / "rest.nc").isel(time=0)
-    theory = initial_theory(scene, scene.mpm.tunnels[0])
+    theory = initial_theory(scene, scene.tunnels[0])
     # K0 and hydrostatic stress are in equilibrium on any mesh; a polygon of this size has its faces 2 % off the circle
     for name in ("soil_pressure", "water_pressure"):
         np.testing.assert_allclose(first[name], theory[name], rtol=0.05)
@@ -105,8 +105,8 @@ def test_bonded_ground_at_rest_has_the_theoretical_pressures(tmp_path):
 
 def test_theory_of_the_initial_pressures_is_that_of_the_ring():
     scene = coupling.load_scene("case-3")
-    ours = initial_theory(scene, scene.mpm.tunnels[0])
-    soil = scene.mpm.soils[0]
+    ours = initial_theory(scene, scene.tunnels[0])
+    soil = scene.soils[0]
     buoyant = 9.81 * (1 - soil.porosity) * (soil.grain_density - 1000.0)
     theirs = theoretical_pressures(
         outer_diameter=6.6, cover=20.0, buoyant_unit_weight=buoyant, coefficient_at_rest=3 / 7
@@ -173,7 +173,7 @@ def test_one_layer_of_linear_triangles_is_three_times_as_stiff_and_more_the_long
 
 
 def test_rates_of_simpler_theories():
-    scene = coupling.load_scene("case-3").mpm
+    scene = coupling.load_scene("case-3")
     rates = independent_rates(scene)
     # Torricelli at the axis, 23.3 m below the table
     assert rates["water"] == pytest.approx(1000 * CONTRACTION * 0.2 * np.sqrt(2 * 9.81 * 23.3))
@@ -205,8 +205,8 @@ def test_studies_are_valid_and_a_look_is_coarse():
     assert [len(found) for found in studies.values()] == [11, 2, 17, 4]
     case_3 = studies["cases"][0].scene
     # case 3 is the scene itself, and unknowns are varied from it
-    assert case_3.mpm.discretisation == coupling.load_scene("case-3").mpm.discretisation
-    assert studies["unknowns"][0].changes == {} and studies["unknowns"][0].scene.mpm.soils == case_3.mpm.soils
+    assert case_3.discretisation == coupling.load_scene("case-3").discretisation
+    assert studies["unknowns"][0].changes == {} and studies["unknowns"][0].scene.soils == case_3.soils
     (look,) = plans(quick=True)
-    size = case_3.mpm.discretisation.element_size
-    assert {case.scene.mpm.discretisation.element_size for case in cases(load_study(look))} == {COARSER * size}
+    size = case_3.discretisation.element_size
+    assert {case.scene.discretisation.element_size for case in cases(load_study(look))} == {COARSER * size}

@@ -42,7 +42,7 @@ def scene_ladder(name, inflow_mass, out, tell):
     from verification.accuracy.mesh_ladder import ladder_dataset, run_ladder
 
     scene = coupling.load_scene(name)
-    if scene.mpm.gate is None or scene.ring is None:
+    if scene.gate is None or scene.ring is None:
         raise Refused(f"scene: a mesh ladder needs a gate and a ring, got {name!r} without; add [gate] and [ring]")
     if not inflow_mass > 0:
         raise Refused(f"inflow_mass: must be above 0 kg/m, got {inflow_mass:g}; 1000 is the published one")

@@ -30,7 +30,7 @@ def refined(scene, factor):
     dict
         Changes for :func:`coupling.load_scene`, as keyword `discretisation`.
     """
-    mesh = scene.mpm.discretisation
+    mesh = scene.discretisation
     return {
         "element_size": mesh.element_size * factor,
         "element_size_lining": mesh.element_size_lining * factor,

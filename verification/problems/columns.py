@@ -125,7 +125,7 @@ def hydrostatics(
             "element_size": 3.0, "element_size_lining": size, "size_growth": size_growth, "points_per_element": points,
         },
         numerics=numerics,
-    ).mpm  # fmt: skip
+    )  # fmt: skip
     solver = Solver(scene, build_mesh(scene), threads=1)
     solver.relax()
     before = solver.points.copy()

@@ -64,7 +64,7 @@ def joint_deformation(cases):
 def _members(cases, group):
     names, text = GROUPS[group]
     there = [(k, cases[name]) for k, name in enumerate(names) if name in cases]
-    return [(text(run.scene.mpm), run, {"color": f"C{k}"}) for k, run in there]
+    return [(text(run.scene), run, {"color": f"C{k}"}) for k, run in there]
 
 
 def _rings(cases, rows):

@@ -53,7 +53,7 @@ def draw_case(case, folder: str | Path) -> dict[str, Path]:
     response, pressures, masses = case.responses["beam-spring"], case.of_gate, case.masses
     fields = postprocess.with_inflow(postprocess.element_fields(case.points, case.mesh), case.history)
     record = int(np.abs(response["inflow_mass"].values - case.compared).argmin())
-    gate, joints = float(case.scene.mpm.gate.angle), response["joint_angle"].values
+    gate, joints = float(case.scene.gate.angle), response["joint_angle"].values
     ground, lining = ground_figures, lining_figures
     return _saved(
         folder,
@@ -74,7 +74,7 @@ def draw_case(case, folder: str | Path) -> dict[str, Path]:
 
 def draw_twin(twin, folder: str | Path) -> dict[str, Path]:
     """Figures 6 and 7 of the twin tunnels; parameters as :func:`draw_case`."""
-    theory = [initial_theory(twin.scene, tunnel) for tunnel in twin.scene.mpm.tunnels]
+    theory = [initial_theory(twin.scene, tunnel) for tunnel in twin.scene.tunnels]
     first = twin.at_rest if twin.at_rest is not None else twin.pressures
     return _saved(
         folder,

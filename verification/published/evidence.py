@@ -108,7 +108,7 @@ class RunEvidence:
     def settlement(self):
         """Settlement of the surface (time, x) [m], with inflow_mass (time)."""
         # the layer must be thicker than the points' distance from the surface in the largest elements
-        thick = max(1.0, 0.5 * self.scene.mpm.discretisation.element_size)
+        thick = max(1.0, 0.5 * self.scene.discretisation.element_size)
         settlement = postprocess.surface_settlement(self.points, spacing=thick, depth=thick).to_dataset()
         return postprocess.with_inflow(settlement, self.history)
 
@@ -158,7 +158,7 @@ def at_rest(scene, file: str | Path):
 
     file = Path(file)
     if not file.is_file():
-        ground = scene.mpm.model_copy(update={"initial_contact": "bonded", "lining": "fixed"})
+        ground = scene.model_copy(update={"initial_contact": "bonded", "lining": "fixed"})
         solver = mpm.Solver(ground, mpm.build_mesh(ground))
         solver.relax()
         theta, parts = cell_centres(), []
@@ -172,7 +172,7 @@ def at_rest(scene, file: str | Path):
         found = found.assign_coords(time=("time", [0.0], {"units": "s"}), theta=("theta", theta, {"units": "degree"}))
         file.parent.mkdir(parents=True, exist_ok=True)
         with replaced(file) as beside:
-            write_dataset(beside, found.assign_attrs(gate_tunnel=scene.mpm.gate.tunnel))
+            write_dataset(beside, found.assign_attrs(gate_tunnel=scene.gate.tunnel))
     return read_group(file, None)
 
 
@@ -191,8 +191,8 @@ def initial_theory(scene, tunnel):
     theta = cell_centres()
     angle = np.radians(theta)
     depth = tunnel.axis_depth - tunnel.outer_radius * np.cos(angle)
-    vertical, water = initial_stress(scene.mpm, depth)
-    k0 = scene.mpm.soils[0].lateral_pressure_coefficient(vertical)
+    vertical, water = initial_stress(scene, depth)
+    k0 = scene.soils[0].lateral_pressure_coefficient(vertical)
     soil = vertical * (np.cos(angle) ** 2 + k0 * np.sin(angle) ** 2)
     return xr.Dataset({"soil_pressure": ("theta", soil), "water_pressure": ("theta", water)}, coords={"theta": theta})
 

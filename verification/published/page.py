@@ -126,7 +126,7 @@ def _by_mesh(others, runs, folder):
     from coupling.scenes.scene import load_scene
 
     def size(scene):
-        return scene.mpm.discretisation.element_size / load_scene(scene.name).mpm.discretisation.element_size
+        return scene.discretisation.element_size / load_scene(scene.name).discretisation.element_size
 
     found = {}
     for run in (case.evidence for case in others):
@@ -139,7 +139,7 @@ def _by_mesh(others, runs, folder):
 
 
 def _made(case, missing):
-    mesh, source = case.scene.mpm.discretisation, published_numbers()["source"]
+    mesh, source = case.scene.discretisation, published_numbers()["source"]
     text = (
         f"Made by `gush published` on {datetime.now(UTC):%Y-%m-%d} from runs of {provenance(case.folder)}; case 3 on "
         f"elements of {mesh.element_size:g} m, {mesh.element_size_lining:g} m at the lining, "
@@ -199,7 +199,7 @@ def _changed(rows, columns):
 
 
 def _linings(case, rows):
-    tunnel, size = case.scene.mpm.tunnels[case.scene.mpm.gate.tunnel], SOURCE_MESH["element_size"]
+    tunnel, size = case.scene.tunnels[case.scene.gate.tunnel], SOURCE_MESH["element_size"]
     stiff = one_layer(size, tunnel.outer_radius, tunnel.inner_radius, tunnel.lining_poissons_ratio)
     moving = [row for row in rows[1:] if "lining" in row[0] or "layer" in row[0]]
     thick = tunnel.outer_radius - tunnel.inner_radius
@@ -210,7 +210,7 @@ def _linings(case, rows):
 
 def _rates(case, rows):
     published = next(row["published"] for row in published_numbers()["gushing"] if row["key"] == "rate")
-    found = [("published", float(published)), *independent_rates(case.scene.mpm).items()]
+    found = [("published", float(published)), *independent_rates(case.scene).items()]
     found += [(f"ours, {words}", said["rate"].value) for words, said in rows if "rate" in said]
     found.sort(key=lambda item: -item[1])
     return _markdown(["rate", "kg/m/s"], [(name, f"{value:.3g}") for name, value in found])
@@ -227,7 +227,7 @@ def _cases(cases):
     """Largest forces of all cases at 1000 kg/m, or where they ended, in brackets initially, by both lining models."""
     rows = []
     for name, run in cases.items():
-        scene = run.scene.mpm
+        scene = run.scene
         about = [name, f"{scene.gate.angle:g}°", f"{scene.tunnels[0].cover:g} m", scene.soils[0].name]
         time = float(postprocess.at_inflow(run.history, run.compared)["time"])
         for model, response in run.responses.items():

@@ -16,7 +16,7 @@ def independent_rates(scene) -> dict[str, float]:
 
     Parameters
     ----------
-    scene : mpm.Scene
+    scene : coupling.Scene
 
     Returns
     -------

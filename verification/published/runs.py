@@ -24,7 +24,7 @@ def sizes(factor: float) -> dict:
     """Sizes of the mesh of case 3, all of them `factor` times as large."""
     from coupling.scenes.scene import load_scene
 
-    mesh = load_scene("case-3").mpm.discretisation
+    mesh = load_scene("case-3").discretisation
     names = ("element_size", "element_size_lining", "element_size_interior", "size_growth")
     across = max(2, round(mesh.elements_across_gate / factor))
     return {name: factor * getattr(mesh, name) for name in names} | {"elements_across_gate": across}

@@ -112,7 +112,7 @@ def _flow(case):
     faster = stages.rates[1] / max(stages.rates[0], stages.rates[2], 1e-9)
     told = "{:.3g}, {:.3g}, {:.3g} m²/s, bends at {:.3g} and {:.3g} s".format(*stages.rates, *stages.bends)
     found = {"straight": Found(straight), "rate": Found(rate), "stages": Found(faster, told)}
-    gate, degrees = float(case.scene.mpm.gate.angle), {}
+    gate, degrees = float(case.scene.gate.angle), {}
     for name in ("soil", "water"):
         beside = [gate - 5, gate + 5]
         found[f"{name} gate"] = Found(postprocess.ratio_to_initial(pressures, f"{name}_pressure", mass, beside))
@@ -133,7 +133,7 @@ def measured_case(case: RunEvidence, ring=None) -> dict[str, Found]:
 def measured_twin(twin: RunEvidence) -> dict[str, Found]:
     """Ours to the statements on the twin tunnels."""
     first, found = (twin.at_rest if twin.at_rest is not None else twin.pressures).isel(time=0), {}
-    theory = [initial_theory(twin.scene, tunnel) for tunnel in twin.scene.mpm.tunnels]
+    theory = [initial_theory(twin.scene, tunnel) for tunnel in twin.scene.tunnels]
     for name in ("soil", "water"):
         column = f"{name}_pressure"
         errors = [float(np.abs(first[column].isel(tunnel=k) / one[column] - 1).max()) for k, one in enumerate(theory)]

@@ -103,5 +103,5 @@ def _joints(cases):
 def _fallen(run):
     """Half of the sector around the gate, in one piece, in which soil pressure has fallen [degree]."""
     ratio = postprocess.pressure_ratio(run.of_gate, "soil_pressure", run.compared).values
-    below = np.roll(ratio, -round(float(run.scene.mpm.gate.angle))) < FALLEN
+    below = np.roll(ratio, -round(float(run.scene.gate.angle))) < FALLEN
     return 0.5 * (int(np.argmin(below)) + int(np.argmin(below[::-1]))) if not below.all() else 180.0

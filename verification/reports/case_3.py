@@ -49,16 +49,16 @@ def measured(folder):
     """The numbers of the report: list of (what, wanted, value as text, met or None), and the same as a dict."""
     history, pressures, mesh = read_history(folder), read_pressures(folder), read_mesh(folder)
     scene = coupling.load_scene(Path(folder) / "scene.toml")
-    gate = scene.mpm.gate.angle
+    gate = scene.gate.angle
     rows, data = [], {}
 
     def row(key, what, wanted, value, met, text):
         rows.append((what, wanted, text, met))
         data[key] = {"value": value, "wanted": wanted, "met": met}
 
-    bonded = _bonded(scene.mpm)
+    bonded = _bonded(scene)
     for name, limit in (("soil_pressure", 0.02), ("water_pressure", 0.01)):
-        error = _initial_error(bonded, scene.mpm, name)
+        error = _initial_error(bonded, scene, name)
         row(f"initial_{name}_error", f"{name.replace('_', ' ')} of bonded ground at rest against theory, worst angle",
             f"<= {limit:.0%}", error, bool(error <= limit), f"{error:.2%}")  # fmt: skip
     steps = np.diff(history["inflow_mass"].values)
@@ -79,7 +79,7 @@ def measured(folder):
     mass = history["grain_mass"].values
     lost = float(np.abs(mass / mass[0] - 1).max())
     row("grain_mass_error", "grain mass conserved", "1e-10", lost, lost <= 1e-10, f"{lost:.1e}")
-    width = np.degrees(scene.mpm.gate.width / scene.mpm.tunnels[0].outer_radius)
+    width = np.degrees(scene.gate.width / scene.tunnels[0].outer_radius)
     for name in ("soil_pressure", "water_pressure"):
         for angle, where in ((5.0, "5 degrees beside the gate"), (width, "one gate width from its middle")):
             ratio = postprocess.ratio_to_initial(pressures, name, 1000, [gate - angle, gate + angle])
@@ -100,7 +100,7 @@ def measured(folder):
         ("heap_porosity", postprocess.heap(read_points(folder, -1), mesh), "at the end of the run"),
         (
             "settled_heap_porosity",
-            _settled_heap(scene.mpm, mesh),
+            _settled_heap(scene, mesh),
             f"{SETTLING:g} s after the gate was shut at 1000 kg/m",
         ),
     ):

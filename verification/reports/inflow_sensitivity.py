@@ -31,7 +31,7 @@ AVERAGED = 0.9  # of the last mark: pressures are means from there on
 BESIDE_GATE = 25.0  # degrees that roughness and noise leave out
 BESIDE = 10  # degrees to both sides that they compare with
 PATIENCE = 30.0  # simulated seconds
-K0 = coupling.load_scene("quick").mpm.soils[0].elastic_k0
+K0 = coupling.load_scene("quick").soils[0].elastic_k0
 NUMERICS = (
     ("as the scene has it", {}),
     ("half the elements across the gate", {"across": 0.5}),
@@ -96,7 +96,7 @@ PHYSICS = (
 def varied(name, changes):
     """A built-in scene with these changes."""
     scene = coupling.load_scene(name)
-    ground = scene.mpm.model_dump()
+    ground = scene.model_dump()
     ground["soils"] = [ground["soils"][0] | changes.get("soil", {})]
     for part in ("numerics", "water", "gate", "discretisation"):
         ground[part] |= changes.get(part, {})
@@ -106,13 +106,13 @@ def varied(name, changes):
         mesh[name] *= factor
     across = changes.get("across", 1.0 / factor)
     mesh["elements_across_gate"] = max(2, round(mesh["elements_across_gate"] * across))
-    return scene.model_copy(update={"mpm": mpm.Scene.model_validate(ground)})
+    return coupling.Scene.model_validate(ground)
 
 
 def measure(name, what, changes):
     """One row of the table: times [s], forces [N/m], moments [N m/m], pressures [Pa], roughness [-], cost."""
     scene = varied(name, changes)
-    simulation = mpm.Simulation(scene.mpm, threads=1)
+    simulation = mpm.Simulation(scene, threads=1)
     simulation.begin()
     solver = simulation.solver
     solver.impulse[:] = 0.0
@@ -137,7 +137,7 @@ def measure(name, what, changes):
         {"time": ("time", [solver.time], {"units": "s"}), "theta": ("theta", theta, {"units": "degree"})},
     )
     forces = respond(scene, pressures)
-    gate = scene.mpm.gate.angle
+    gate = scene.gate.angle
     soil, water = pressures.soil_pressure.values[0], pressures.water_pressure.values[0]
     mean, parabola = (savgol_filter(soil, 2 * BESIDE + 1, order, mode="wrap") for order in (0, 2))
     far = np.abs((theta - gate + 180) % 360 - 180) > BESIDE_GATE
@@ -219,7 +219,7 @@ def beside_seepage(name, rows, choices):
     lines.append("|" + "---|" * 3)
     for row, (what, changes) in zip(rows, choices, strict=True):
         rate = (MARKS[name][-1] - MARKS[name][0]) / (row["times"][-1] - row["times"][0])
-        lines.append(f"| {what} | {rate:.0f} | {seepage(varied(name, changes).mpm):.3g} |")
+        lines.append(f"| {what} | {rate:.0f} | {seepage(varied(name, changes)):.3g} |")
     return lines
 
 

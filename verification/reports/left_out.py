@@ -54,12 +54,12 @@ def variants(scene):
 
 def snapshot_cost(scene):
     """Processor time [s] and bytes in the file of the first snapshot of the points, its copy included."""
-    simulation = mpm.Simulation(scene.mpm, threads=1)
+    simulation = mpm.Simulation(scene, threads=1)
     record = simulation.begin()
     seconds, sizes = [], []
     with tempfile.TemporaryDirectory() as folder:
         for kept in (None, record.points):
-            writer = RunWriter(Path(folder) / "run.nc", root_attributes(scene), scene.mpm)
+            writer = RunWriter(Path(folder) / "run.nc", root_attributes(scene), scene)
             begin = clock.process_time()
             if kept is not None:
                 simulation.solver.points_by_name()
@@ -86,7 +86,7 @@ def main():
     need_docs()
     rows, solvers = [], {}
     case_3 = coupling.load_scene("case-3")
-    for name, without, base, scene in variants(case_3.mpm):
+    for name, without, base, scene in variants(case_3):
         solver = mpm.Solver(scene, mpm.build_mesh(scene), threads=1)
         if scene.gate is not None:
             solver.open_gate()

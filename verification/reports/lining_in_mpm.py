@@ -153,8 +153,8 @@ def step_costs(scene, mesh):
 
 def measure():
     """All numbers of the page."""
-    source = coupling.load_scene("quick", initial_contact="bonded", output={"interval": 0.01})
-    scene, ring = source.mpm, source.ring
+    scene = coupling.load_scene("quick", initial_contact="bonded", output={"interval": 0.01})
+    ring = scene.ring
     mesh = mpm.build_mesh(scene)
     alone = ring.model_copy(update={"joint_angles": (), "ground": None, "support": "invert"})
     data = {"events": {}, "why": {}, "harmonics": {}, "theory": {}}
@@ -195,7 +195,7 @@ def measure():
     for count in (2, 3, 4, 6, 8, 12, 16):
         values, _, _ = initial(changed(scene, lining_harmonics=count), mesh)
         data["harmonics"][count] = extremes(values)
-    fine = coupling.load_scene("case-3", initial_contact="bonded").mpm
+    fine = coupling.load_scene("case-3", initial_contact="bonded")
     values, _, solver = initial(changed(fine, k0=OTHER_K0), mpm.build_mesh(fine))
     data["why"][f"bonded, K0 = {OTHER_K0:.3f}, mesh of case-3"] = extremes(values)
     soil, tunnel = scene.soils[0], scene.tunnels[0]

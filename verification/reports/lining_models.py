@@ -29,14 +29,14 @@ GATE = (90.0, 0.2)
 
 def pressures(scene, n_times):
     """Theory pressures of a scene; around the gate they fall to a tenth, gaussian 15 degrees wide."""
-    tunnel, soil = scene.mpm.tunnels[0], scene.mpm.soils[0]
-    buoyant = (1 - soil.porosity) * (soil.grain_density - scene.mpm.water.density) * scene.mpm.gravity
+    tunnel, soil = scene.tunnels[0], scene.soils[0]
+    buoyant = (1 - soil.porosity) * (soil.grain_density - scene.water.density) * scene.gravity
     base = theoretical_pressures(
         outer_diameter=tunnel.outer_diameter,
         cover=tunnel.cover,
         buoyant_unit_weight=buoyant,
         coefficient_at_rest=soil.lateral_pressure_coefficient(buoyant * tunnel.axis_depth),
-        water_unit_weight=scene.mpm.water.density * scene.mpm.gravity,
+        water_unit_weight=scene.water.density * scene.gravity,
     )
     share = xr.DataArray(np.linspace(0, 0.9, n_times), dims="time")
     fall = share * np.exp(-(((base["theta"] - GATE[0]) / 15) ** 2))

@@ -142,7 +142,7 @@ def simulation_fault(place, text, number):
     scene = place / f"run-{number}.toml"
     scene.write_text(text, encoding="utf-8")
     loaded = load_scene(scene)
-    if loaded.mpm.estimated_elements > 20_000 or (loaded.mpm.stop.time or 1.0) > 0.1:
+    if loaded.estimated_elements > 20_000 or (loaded.stop.time or 1.0) > 0.1:
         return ""
 
     def work():

@@ -101,7 +101,7 @@ def wild_changes(random):
 
 def value_at(scene, name):
     """Value of a scene under a dotted name."""
-    value = scene.mpm
+    value = scene
     for part in name.split("."):
         value = value[int(part)] if part.isdecimal() else getattr(value, part)
     return value

@@ -43,8 +43,8 @@ def bench(scene, step_only=False, large=False, tell=lambda line: None, rounds=RO
     import mpm
 
     load = [os.getloadavg()[0]]
-    mesh = mpm.build_mesh(scene.mpm)
-    solver = prepared(scene.mpm, mesh)
+    mesh = mpm.build_mesh(scene)
+    solver = prepared(scene, mesh)
     data = {"scene": scene.name, **_beside_reference(solver, rounds, seconds)}
     data["elements"] = len(mesh.elements)
     data["bytes_per_point"] = solver.memory_bytes() / solver.n_points
@@ -55,10 +55,10 @@ def bench(scene, step_only=False, large=False, tell=lambda line: None, rounds=RO
     del solver
     if not step_only:
         tell("what a scene has and has not")
-        data["configurations"] = _configurations(scene.mpm, mesh, seconds)
-        data["threads"] = _threads(scene.mpm, mesh, rounds, seconds)
+        data["configurations"] = _configurations(scene, mesh, seconds)
+        data["threads"] = _threads(scene, mesh, rounds, seconds)
         tell("sizes")
-        data["sizes"] = size_ladder(scene.mpm, [*SIZES, LARGEST] if large else SIZES, FEW_SECONDS)
+        data["sizes"] = size_ladder(scene, [*SIZES, LARGEST] if large else SIZES, FEW_SECONDS)
         data["size_slope"] = slope(data["sizes"])
         tell("starts")
         data["imports"] = processes.import_seconds()

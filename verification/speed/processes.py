@@ -16,7 +16,7 @@ START = """
 import time
 def used(): return time.process_time()
 from coupling.scenes.scene import load_scene
-scene = load_scene("quick").mpm
+scene = load_scene("quick")
 loaded = used()
 import mpm
 mesh = mpm.build_mesh(scene)
@@ -37,7 +37,7 @@ import sys, time
 import mpm
 from verification.speed.stepping import steps
 from coupling.scenes.scene import load_scene
-scene = load_scene("quick").mpm
+scene = load_scene("quick")
 solver = mpm.Solver(scene, mpm.build_mesh(scene), threads=1)
 solver.open_gate()
 for _ in range(5):
