@@ -13,25 +13,15 @@ from coupling.figures.picture import Picture
 from verification.published import case_figures, ground_figures, lining_figures
 from verification.published.evidence import initial_theory
 
+#: Pictures that the page shows, by their numbers in the source; all others are drawn beside them.
 CAPTIONS = {
-    "bands": "our numbers over the published ones, with their bands; those with a verdict of their own and one sign",
+    "bands": "our numbers over the published ones, with their bands; those that are one number, and of one sign",
     "06": "settlement troughs by inflow mass, twin tunnels",
-    "07": "initial pressures against theory, twin tunnels",
     "09": "inflow mass and flow zone over time, with its stages",
     "10": "displacement with the flow zone, deviatoric strain, pore pressure, effective stress",
     "11": "soil stress and pore pressure along both axes through the gate",
-    "12": "stress variation ratio",
     "13": "pressures on the lining; gate in red, joints in grey",
-    "14": "pressures over the initial ones",
     "15": "axial force, shear force, bending moment; gate in red, joints in grey",
-    "15-ring": "deformed ring",
-    "16": "extreme forces over inflow mass",
-    "17": "joint opening, dislocation, rotation over inflow mass",
-    "19": "pressure ratios across cases",
-    "20": "additional axial force across cases",
-    "21": "additional moment across cases",
-    "22": "deformation of the lining across cases",
-    "22-displacement": "convergence and settlement of the lining across cases",
     "23": "joint deformation across cases",
 }
 

@@ -21,8 +21,6 @@ from verification.published.statements import measured_case, measured_twin, publ
 from verification.published.trends import trends
 from verification.published.unknowns import finished, moved_by, moved_by_rings, told
 
-#: Pictures that the page shows; all others are drawn beside them.
-SHOWN = ("bands", "06", "09", "10", "11", "13", "15", "23")
 #: What of a changed run is told: key of a statement, head of the column; of one that changes the lining, more.
 COLUMNS = {"rate": "inflow kg/m/s", "soil gate": "soil at gate", "water gate": "water at gate", "crown": "crown %",
            "invert": "invert %", "Q": "Q %", "M+": "M+ %", "M-": "M- %", "N": "N %", "influence_soil": "soil D",
@@ -84,7 +82,7 @@ def write_page(folder: str | Path, out: str | Path) -> dict:
         "meshes": _meshes(meshes),
         "linings": _linings(case, rows),
         "rates": _rates(case, rows),
-        "figures": [line for number in SHOWN if number in figures for line in _figure(number, figures[number], out)],
+        "figures": [line for number in CAPTIONS if number in figures for line in _figure(number, figures[number], out)],
         "rules": [_text("rules.md")],
     }
     page = out / "published.md"
@@ -143,8 +141,8 @@ def _made(case, missing):
     text = (
         f"Made by `gush published` on {datetime.now(UTC):%Y-%m-%d} from runs of {provenance(case.folder)}; case 3 on "
         f"elements of {mesh.element_size:g} m, {mesh.element_size_lining:g} m at the lining, "
-        f"{mesh.elements_across_gate} across the gate. Published: {source}; angles from the crown, clockwise; per metre "
-        f"of tunnel; at {case.compared:.0f} kg/m unless said."
+        f"{mesh.elements_across_gate} across the gate. Published: {source}; angles from the crown, clockwise; per "
+        f"metre of tunnel; at {case.compared:.0f} kg/m unless said."
     )
     return [text + (f" Not finished, so left out: {', '.join(missing)}." if missing else "")]
 
@@ -201,7 +199,7 @@ def _changed(rows, columns):
 def _linings(case, rows):
     tunnel, size = case.scene.tunnels[case.scene.gate.tunnel], SOURCE_MESH["element_size"]
     stiff = one_layer(size, tunnel.outer_radius, tunnel.inner_radius, tunnel.lining_poissons_ratio)
-    moving = [row for row in rows[1:] if "lining" in row[0] or "layer" in row[0]]
+    moving = [row for row in rows[1:] if row[0].startswith("lining")]
     thick = tunnel.outer_radius - tunnel.inner_radius
     text = f"One layer of linear triangles of {size:g} m through {thick:.2f} m resists the second harmonic"
     text += f" **{stiff:.1f} times** as much as the ring does (plane strain, against quadratic triangles)."

@@ -22,12 +22,6 @@ NAMES = {
     "lining": LINING,
     "tunnels.0": LINING,
 }
-WORDS = {
-    "hydraulic_conductivity": "conductivity {:g} m/s", "dilatancy_angle": "dilatancy {:g}°", "corners": "corner {}",
-    "loose_porosity": "loose porosity {:g}", "elements_across_gate": "{} elements across the gate",
-    "element_size": "mesh of the source", "angle": "gate at {:g}°", "lining": "lining {}",
-    "lining_modulus": "lining as stiff as one layer of triangles",
-}  # fmt: skip
 
 
 class CaseRun(NamedTuple):
@@ -60,13 +54,11 @@ def finished(folder: str | Path) -> list[CaseRun]:
 
 def told(changes: dict) -> str:
     """What a case changes, in a few words."""
-    words = []
+    flat = {}
     for name, value in changes.items():
-        if isinstance(value, dict):
-            words.append(told({key: one for key, one in value.items() if key != "lining"} if "element_size" not in value
-                              else {"element_size": None}))  # fmt: skip
-        else:
-            words.append(WORDS.get(name.rpartition(".")[2], name + " {}").format(value))
+        flat |= value if isinstance(value, dict) else {name.rpartition(".")[2]: value}
+    words = [f"{name.replace('_', ' ')} {value:g}" if isinstance(value, float) else f"{name.replace('_', ' ')} {value}"
+             for name, value in flat.items()]  # fmt: skip
     return ", ".join(words) or "as it is"
 
 
