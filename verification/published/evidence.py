@@ -124,6 +124,12 @@ class RunEvidence:
             ours[name][{"time": 0}] = first[name].isel(time=0).values
         return ours
 
+    def relieved(self, name: str) -> float:
+        """Half of the sector around the gate, in one piece, with a pressure below half of the initial one [°]."""
+        ratio = postprocess.pressure_ratio(self.of_gate, name, self.compared).values
+        below = np.roll(ratio, -round(float(self.scene.gate.angle))) < 0.5
+        return 0.5 * (int(np.argmin(below)) + int(np.argmin(below[::-1]))) if not below.all() else 180.0
+
     def states(self, ring=None):
         """Response of the beam-spring ring, or of another `ring`, at the initial state, 1000 and 2000 kg/m.
 

@@ -22,7 +22,8 @@ from verification.published.trends import trends
 from verification.published.unknowns import finished, moved_by, moved_by_rings, told
 
 #: What of a changed run is told: key of a statement, head of the column; of one that changes the lining, more.
-COLUMNS = {"rate": "inflow kg/m/s", "soil gate": "soil at gate", "water gate": "water at gate", "crown": "crown %",
+COLUMNS = {"rate": "inflow kg/m/s", "soil gate": "soil at gate", "water gate": "water at gate",
+           "soil relief": "soil halved ±°", "water relief": "water halved ±°", "crown": "crown %",
            "invert": "invert %", "Q": "Q %", "M+": "M+ %", "M-": "M- %", "N": "N %", "influence_soil": "soil D",
            "influence_water": "water D", "arch": "arch D"}  # fmt: skip
 LININGS = {**{f"M{k}": f"M joint {k}" for k in range(1, 7)}, "M invert": "M invert", "Q": "Q %", "M+": "M+ %",
@@ -189,8 +190,9 @@ def _disagreements(verdicts):
 def _changed(rows, columns):
     """What changed runs say: one row a run, one column a statement."""
     stated = statements("initial", "gushing")
+    forms = {key: _bare(stated[key].form) if key in stated else "{:.0f}" for key in columns}
     lines = [
-        (words, *(_bare(stated[k].form).format(found[k].value) if k in found else "not reached" for k in columns))
+        (words, *(form.format(found[key].value) if key in found else "not reached" for key, form in forms.items()))
         for words, found in rows
     ]
     return _markdown(["changed", *columns.values()], lines)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-#: How much coarser than those of the scenes the meshes are, of most cases and all unknowns, and between.
-COARSE, MIDDLE = 2.0, 1.4
+#: How much coarser than that of case 3 the meshes are: a second one of case 3, that of the other cases, of the unknowns.
+MIDDLE, COARSE, COARSEST = 1.4, 2.0, 3.0
 #: Where most cases end, and where case 3 and the twin tunnels do: inflow masses that the source looks at [kg/m].
 COMPARED, LAST = 1000.0, 2000.0
 OUTPUT = {"output.interval": 0.02, "output.snapshot_interval": 0.1}
@@ -34,7 +34,7 @@ def plans(quick: bool = False) -> list[dict]:
     """Definitions of the studies, in the order in which they run; see :class:`coupling.studies.design.Study`.
 
     Case 3 is on the mesh of its scene and on two others, the other cases are on one that is :data:`COARSE` times as
-    coarse, which moves forces by a hundredth; case 5 and the twin tunnels also on the one between.
+    coarse, which moves forces by a hundredth; case 5, the twin tunnels and all unknowns on a still coarser one.
 
     Parameters
     ----------
@@ -43,27 +43,28 @@ def plans(quick: bool = False) -> list[dict]:
     """
     whole, part = {"inflow_mass": LAST, "time": 20.0}, {"inflow_mass": COMPARED, "time": 10.0}
     others = [f"case-{k}" for k in (5, 1, 2, 4, 9, 10, 7, 8, 6)]
-    scenes, coarse = ["case-3", *others, "twin-tunnels"], {f"discretisation.{k}": v for k, v in sizes(COARSE).items()}
+    scenes = ["case-3", *others, "twin-tunnels"]
     meshes = [sizes(COARSE if quick else 1.0)] + [sizes(COARSE)] * (len(scenes) - 1)
     cases = {"name": "cases", "design": "list", "backends": ["beam-spring", "continuum"], "fixed": OUTPUT,
              "parameters": {"scene": scenes, "stop": [whole, *[part] * len(others), whole],
                             "discretisation": meshes}}  # fmt: skip
     if quick:
         return [cases]
-    coarse |= OUTPUT | {"stop.inflow_mass": COMPARED, "stop.time": 12.0, "output.snapshot_interval": 0.25}
+    coarsest = {f"discretisation.{k}": v for k, v in sizes(COARSEST).items()}
+    coarsest |= OUTPUT | {"stop.inflow_mass": COMPARED, "stop.time": 30.0, "output.snapshot_interval": 0.25}
     return [
         cases,
         {"name": "meshes", "design": "list", "fixed": OUTPUT,
-         "parameters": {"scene": ["case-3", "case-3", "twin-tunnels", "case-5"], "stop": [whole] * 3 + [part],
-                        "discretisation": [sizes(MIDDLE), sizes(COARSE), sizes(MIDDLE), sizes(MIDDLE)]}},
-        {"name": "unknowns", "design": "one-at-a-time", "scene": "case-3", "fixed": coarse,
+         "parameters": {"scene": ["case-3", "case-3", "case-5", "twin-tunnels"], "stop": [part] * 4,
+                        "discretisation": [sizes(MIDDLE), sizes(COARSE), sizes(COARSEST), sizes(COARSEST)]}},
+        {"name": "unknowns", "design": "one-at-a-time", "scene": "case-3", "fixed": coarsest,
          "parameters": {
              "soils.0.loose_porosity": [0.5, 0.6], "gate.corners": ["slipping"],
              "discretisation": [{"elements_across_gate": 2}, {"elements_across_gate": 8}, SOURCE_MESH],
              "lining": ["floating", "elastic"], "tunnels.0": [ONE_LAYER],
              "soils.0.hydraulic_conductivity": [1e-3, 1e-2, 1e-5], "soils.0.dilatancy_angle": [5.0, 2.0],
              "soils.0": list(TOGETHER)}},
-        {"name": "twin-unknowns", "design": "one-at-a-time", "scene": "twin-tunnels", "fixed": coarse,
+        {"name": "twin-unknowns", "design": "one-at-a-time", "scene": "twin-tunnels", "fixed": coarsest,
          "parameters": {"gate.angle": [90.0], "soils.0.hydraulic_conductivity": [1e-2],
                         "soils.0.dilatancy_angle": [5.0]}},
     ]  # fmt: skip

@@ -118,6 +118,7 @@ def _flow(case):
         found[f"{name} gate"] = Found(postprocess.ratio_to_initial(pressures, f"{name}_pressure", mass, beside))
         ratio = postprocess.pressure_ratio(pressures, f"{name}_pressure", mass).values
         degrees[name] = int(np.sum(np.abs(ratio - 1) > 0.1))
+        found[f"{name} relief"] = Found(case.relieved(f"{name}_pressure"))
     found["wider"] = Found(degrees["soil"] - degrees["water"], f"water {degrees['water']}, soil {degrees['soil']}")
     for angle, where in ((0, "crown"), (180, "invert")):
         found[where] = Found(100 * (postprocess.ratio_to_initial(pressures, "soil_pressure", mass, [angle]) - 1))
