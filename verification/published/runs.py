@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-#: How much coarser than that of case 3 the meshes are: a second one of case 3, that of the other cases, of the unknowns.
+#: How much coarser than that of case 3 meshes are: its second one, that of the unknowns, the coarsest of a look.
 MIDDLE, COARSE, COARSEST = 1.4, 2.0, 3.0
 #: Where most cases end, and where case 3 and the twin tunnels do: inflow masses that the source looks at [kg/m].
 COMPARED, LAST = 1000.0, 2000.0
 OUTPUT = {"output.interval": 0.02, "output.snapshot_interval": 0.1}
+SELDOM = {"output.interval": 0.05, "output.snapshot_interval": 0.25}
 TOGETHER = (
     {"hydraulic_conductivity": 1e-2, "dilatancy_angle": 5.0},
     {"hydraulic_conductivity": 1e-5, "dilatancy_angle": 5.0},
@@ -33,38 +34,39 @@ def sizes(factor: float) -> dict:
 def plans(quick: bool = False) -> list[dict]:
     """Definitions of the studies, in the order in which they run; see :class:`coupling.studies.design.Study`.
 
-    Case 3 is on the mesh of its scene and on two others, the other cases are on one that is :data:`COARSE` times as
-    coarse, which moves forces by a hundredth; case 5, the twin tunnels and all unknowns on a still coarser one.
+    All cases are on the meshes of their scenes, case 3 also on two others, case 5 and the twin tunnels on one; unknowns
+    are varied on a mesh :data:`COARSE` times as coarse.
 
     Parameters
     ----------
     quick : bool
-        The cases alone, on the coarse mesh: a look; nothing is said of errors and unknowns.
+        A look: case 3 on a mesh :data:`COARSE` times as coarse, all the rest on one that is :data:`COARSEST`; one
+        lining model.
     """
     whole, part = {"inflow_mass": LAST, "time": 20.0}, {"inflow_mass": COMPARED, "time": 10.0}
-    others = [f"case-{k}" for k in (5, 1, 2, 4, 9, 10, 7, 8, 6)]
-    scenes = ["case-3", *others, "twin-tunnels"]
-    meshes = [sizes(COARSE if quick else 1.0)] + [sizes(COARSE)] * (len(scenes) - 1)
-    cases = {"name": "cases", "design": "list", "backends": ["beam-spring", "continuum"], "fixed": OUTPUT,
-             "parameters": {"scene": scenes, "stop": [whole, *[part] * len(others), whole],
-                            "discretisation": meshes}}  # fmt: skip
-    if quick:
-        return [cases]
-    coarsest = {f"discretisation.{k}": v for k, v in sizes(COARSEST).items()}
-    coarsest |= OUTPUT | {"stop.inflow_mass": COMPARED, "stop.time": 30.0, "output.snapshot_interval": 0.25}
+    scenes = ["case-3", "twin-tunnels", *(f"case-{k}" for k in (1, 2, 4, 5, 6, 7, 8, 9, 10))]
+    own, other, varied = (COARSE, COARSEST, COARSEST) if quick else (1.0, 1.0, COARSE)
+    again = [("case-3", COARSEST)] if quick else [
+        ("case-3", MIDDLE), ("case-3", COARSE), ("twin-tunnels", COARSE), ("case-5", COARSE)
+    ]  # fmt: skip
+    unknowns = {f"discretisation.{name}": value for name, value in sizes(varied).items()} | SELDOM
+    unknowns |= {"stop.inflow_mass": COMPARED, "stop.time": 12.0 if quick else 30.0}
     return [
-        cases,
-        {"name": "meshes", "design": "list", "fixed": OUTPUT,
-         "parameters": {"scene": ["case-3", "case-3", "case-5", "twin-tunnels"], "stop": [part] * 4,
-                        "discretisation": [sizes(MIDDLE), sizes(COARSE), sizes(COARSEST), sizes(COARSEST)]}},
-        {"name": "unknowns", "design": "one-at-a-time", "scene": "case-3", "fixed": coarsest,
+        {"name": "cases", "design": "list", "fixed": SELDOM if quick else OUTPUT,
+         "backends": ["beam-spring"] if quick else ["beam-spring", "continuum"],
+         "parameters": {"scene": scenes, "stop": [whole, part if quick else whole, *[part] * (len(scenes) - 2)],
+                        "discretisation": [sizes(own), *[sizes(other)] * (len(scenes) - 1)]}},
+        {"name": "meshes", "design": "list", "fixed": SELDOM,
+         "parameters": {"scene": [name for name, _ in again], "stop": [part] * len(again),
+                        "discretisation": [sizes(size) for _, size in again]}},
+        {"name": "unknowns", "design": "one-at-a-time", "scene": "case-3", "fixed": unknowns,
          "parameters": {
              "soils.0.loose_porosity": [0.5, 0.6], "gate.corners": ["slipping"],
              "discretisation": [{"elements_across_gate": 2}, {"elements_across_gate": 8}, SOURCE_MESH],
              "lining": ["floating", "elastic"], "tunnels.0": [ONE_LAYER],
              "soils.0.hydraulic_conductivity": [1e-3, 1e-2, 1e-5], "soils.0.dilatancy_angle": [5.0, 2.0],
              "soils.0": list(TOGETHER)}},
-        {"name": "twin-unknowns", "design": "one-at-a-time", "scene": "twin-tunnels", "fixed": coarsest,
+        {"name": "twin-unknowns", "design": "one-at-a-time", "scene": "twin-tunnels", "fixed": unknowns,
          "parameters": {"gate.angle": [90.0], "soils.0.hydraulic_conductivity": [1e-2],
                         "soils.0.dilatancy_angle": [5.0]}},
     ]  # fmt: skip

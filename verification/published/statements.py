@@ -73,9 +73,12 @@ def measured_initially(case: RunEvidence, states) -> dict[str, Found]:
 
 def measured_while_gushing(case: RunEvidence, states) -> dict[str, Found]:
     """Ours to the statements on the event, those that the run got far enough for."""
-    found, mass = _flow(case), case.compared
+    mass = case.compared
+    rate, straight = postprocess.inflow_linearity(case.history, 0.1 * mass, mass)
+    found = {"straight": Found(straight), "rate": Found(rate)}
     if states.sizes["time"] < 2:
         return found
+    found |= _pressures(case, mass)
     first, now = states.isel(time=0), states.isel(time=1)
     for key, name, pick in (("Q", "shear_force", _largest), ("M+", "bending_moment", np.max),
                             ("M-", "bending_moment", np.min), ("N", "axial_force", np.max)):  # fmt: skip
@@ -87,6 +90,9 @@ def measured_while_gushing(case: RunEvidence, states) -> dict[str, Found]:
     found["worst joints"] = Found(len(set(worst) & set(numbers["worst_joints"])), " and ".join(map(str, worst)))
     found["joint 2"] = Found(1e3 * float(now["joint_rotation"].sel(joint=numbers["joint_open_outside"])))
     if states.sizes["time"] > 2:
+        stages = postprocess.flow_zone_stages(case.history)
+        told = "{:.3g}, {:.3g}, {:.3g} m²/s, bends at {:.3g} and {:.3g} s".format(*stages.rates, *stages.bends)
+        found["stages"] = Found(stages.rates[1] / max(stages.rates[0], stages.rates[2], 1e-9), told)
         last = states.isel(time=2)
         for key, name in (("Q", "shear_force"), ("M", "bending_moment"), ("N", "axial_force")):
             pick = _largest if key == "Q" else np.max
@@ -104,14 +110,9 @@ def measured_while_gushing(case: RunEvidence, states) -> dict[str, Found]:
     return found
 
 
-def _flow(case):
-    """Inflow, stages and pressures on the lining."""
-    pressures, mass = case.of_gate, case.compared
-    rate, straight = postprocess.inflow_linearity(case.history, 0.1 * mass, mass)
-    stages = postprocess.flow_zone_stages(case.history)
-    faster = stages.rates[1] / max(stages.rates[0], stages.rates[2], 1e-9)
-    told = "{:.3g}, {:.3g}, {:.3g} m²/s, bends at {:.3g} and {:.3g} s".format(*stages.rates, *stages.bends)
-    found = {"straight": Found(straight), "rate": Found(rate), "stages": Found(faster, told)}
+def _pressures(case, mass):
+    """Pressures on the lining over the initial ones at an inflow mass."""
+    pressures, found = case.of_gate, {}
     gate, degrees = float(case.scene.gate.angle), {}
     for name in ("soil", "water"):
         beside = [gate - 5, gate + 5]
