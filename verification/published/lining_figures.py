@@ -37,7 +37,9 @@ def rings(panels, columns, gate=None, joints=(), heads=()):
     """
     count = -(-len(panels) // columns)
     with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(7.4, 3.0 * count + 0.3 * bool(heads)), layout="constrained")
+        height, foot = 3.0 * count + 0.9 * bool(heads), 0.6 * bool(heads)
+        figure = Picture(figsize=(7.4, height), layout="constrained")
+        figure.get_layout_engine().set(rect=(0, foot / height, 1, 1 - foot / height))
         axes = figure.subplots(count, columns, subplot_kw={"projection": "polar"}, squeeze=False)
         for axis, (title, curves) in zip(axes.flat, panels, strict=True):
             crown_up(axis)
@@ -58,7 +60,8 @@ def rings(panels, columns, gate=None, joints=(), heads=()):
         for axis in below:
             handles, labels = axis.get_legend_handles_labels()
             if heads:
-                axis.legend(handles, labels, fontsize=6.5, loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2)
+                below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.12), "ncols": 2}
+                axis.legend(handles, labels, fontsize=6.5, **below).set_in_layout(False)
             else:
                 figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
     return figure
