@@ -33,13 +33,14 @@ def rings(panels, columns, gate=None, joints=(), heads=()):
     joints : sequence of float
         Angles of grey marks [degree].
     heads : sequence of str
-        Titles of the columns.
+        Titles of the columns; those of the panels then stand beside the rows.
     """
     count = -(-len(panels) // columns)
     with matplotlib.rc_context(STYLE):
-        height, foot = 3.0 * count + 0.9 * bool(heads), 0.6 * bool(heads)
-        figure = Picture(figsize=(7.4, height), layout="constrained")
-        figure.get_layout_engine().set(rect=(0, foot / height, 1, 1 - foot / height))
+        height = (2.4 if heads else 3.0) * count + 1.1 * bool(heads)
+        figure = Picture(figsize=(7.4, height), layout=None if heads else "constrained")
+        if heads:  # legends below columns are more than the constrained layout finds room for
+            figure.subplots_adjust(0.1, 0.8 / height, 0.98, 1 - 0.4 / height, wspace=0.45, hspace=0.3)
         axes = figure.subplots(count, columns, subplot_kw={"projection": "polar"}, squeeze=False)
         for axis, (title, curves) in zip(axes.flat, panels, strict=True):
             crown_up(axis)
@@ -53,15 +54,18 @@ def rings(panels, columns, gate=None, joints=(), heads=()):
             axis.plot(np.radians(joints), np.full(len(joints), rim), "s", color="0.5", ms=3, clip_on=False, zorder=5)
             if gate is not None:
                 axis.plot(np.radians(gate), rim, "v", color=GATE, ms=6, clip_on=False, zorder=6)
-            axis.set_title(title, pad=12)
+            if heads:
+                axis.set_ylabel(title if axis in axes[:, 0] else "", labelpad=28)
+            else:
+                axis.set_title(title, pad=12)
         for axis, head in zip(axes[0], heads, strict=False):
-            axis.set_title(f"{head}\n{axis.get_title()}", pad=12)
+            axis.set_title(head, pad=12)
         below = axes[-1] if heads else axes[-1][:1]
         for axis in below:
             handles, labels = axis.get_legend_handles_labels()
             if heads:
                 below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.12), "ncols": 2}
-                axis.legend(handles, labels, fontsize=6.5, **below).set_in_layout(False)
+                axis.legend(handles, labels, fontsize=6.5, **below)
             else:
                 figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
     return figure

@@ -11,6 +11,9 @@ import numpy as np
 from coupling import postprocess
 from verification.published.evidence import LAST, RunEvidence, initial_theory
 
+#: Records of a run that says anything of the event.
+FEWEST = 12
+
 
 class Statement(NamedTuple):
     """A statement of the source as a number.
@@ -73,6 +76,8 @@ def measured_initially(case: RunEvidence, states) -> dict[str, Found]:
 
 def measured_while_gushing(case: RunEvidence, states) -> dict[str, Found]:
     """Ours to the statements on the event, those that the run got far enough for."""
+    if case.history.sizes["time"] < FEWEST:
+        return {}
     mass = case.compared
     rate, straight = postprocess.inflow_linearity(case.history, 0.1 * mass, mass)
     found = {"straight": Found(straight), "rate": Found(rate)}
