@@ -143,8 +143,8 @@ def _made(case, missing):
     mesh, source = case.scene.discretisation, published_numbers()["source"]
     look = "" if mesh == load_scene("case-3").discretisation else " --quick"
     text = (
-        f"Made by `gush published{look}` on {datetime.now(UTC):%Y-%m-%d} from runs of {provenance(case.folder)}; case 3 on "
-        f"elements of {mesh.element_size:g} m, {mesh.element_size_lining:g} m at the lining, "
+        f"Made by `gush published{look}` on {datetime.now(UTC):%Y-%m-%d} from runs of {provenance(case.folder)}; case 3 "
+        f"on elements of {mesh.element_size:g} m, {mesh.element_size_lining:g} m at the lining, "
         f"{mesh.elements_across_gate} across the gate. Published: {source}; angles from the crown, clockwise; per "
         f"metre of tunnel; at {case.compared:.0f} kg/m unless said."
     )
