@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from datetime import UTC, datetime
+from functools import partial
 from importlib import resources
 from pathlib import Path
 
@@ -61,8 +62,9 @@ def write_page(folder: str | Path, out: str | Path) -> dict:
     verdicts, rows = judge_case(case, meshes.get("case-3", {}), finished(folder / "unknowns"))
     images = out / "images" / "published"
     if twin is not None:
-        changed = moved_by(finished(folder / "twin-unknowns"), measured_twin)
-        verdicts |= _verdicts(("twin",), meshes.get("twin-tunnels", {1.0: twin}), measured_twin, changed, twin)
+        measure = partial(measured_twin, masses=twin.masses)
+        changed = moved_by(finished(folder / "twin-unknowns"), measure)
+        verdicts |= _verdicts(("twin",), meshes.get("twin-tunnels", {1.0: twin}), measure, changed, twin)
         figures = draw_twin(twin, images)
     else:
         figures = {}
@@ -143,8 +145,8 @@ def _made(case, missing):
     mesh, source = case.scene.discretisation, published_numbers()["source"]
     look = "" if mesh == load_scene("case-3").discretisation else " --quick"
     text = (
-        f"Made by `gush published{look}` on {datetime.now(UTC):%Y-%m-%d} from runs of {provenance(case.folder)}; case 3 "
-        f"on elements of {mesh.element_size:g} m, {mesh.element_size_lining:g} m at the lining, "
+        f"Made by `gush published{look}` on {datetime.now(UTC):%Y-%m-%d} from runs of {provenance(case.folder)}; case "
+        f"3 on elements of {mesh.element_size:g} m, {mesh.element_size_lining:g} m at the lining, "
         f"{mesh.elements_across_gate} across the gate. Published: {source}; angles from the crown, clockwise; per "
         f"metre of tunnel; at {case.compared:.0f} kg/m unless said."
     )
