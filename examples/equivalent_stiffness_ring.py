@@ -3,7 +3,7 @@
 from pydantic import Field
 
 from coupling import load_scene
-from structure import BeamSpringLining, LiningModel, Ring, theory
+from structure import BeamSpringLining, Ring, theory
 
 
 class SoftenedRing(Ring):
@@ -13,17 +13,19 @@ class SoftenedRing(Ring):
     bending_stiffness = property(lambda self: self.efficiency * Ring.bending_stiffness.fget(self))
 
 
-class EquivalentStiffnessLining(LiningModel):
+class EquivalentStiffnessLining(BeamSpringLining):
     """No joints; staggered segments take M (1 + zeta), and M (1 - zeta) is left for the joints between them."""
 
+    name = "equivalent-stiffness"
+
     def __init__(self, ring, efficiency, moment_increase=0.0):
-        softened = SoftenedRing(**ring.model_dump() | {"joint_angles": (), "efficiency": efficiency})
-        self.homogeneous, self.moment_increase = BeamSpringLining(softened), moment_increase
+        super().__init__(SoftenedRing(**ring.model_dump() | {"joint_angles": (), "efficiency": efficiency}))
+        self.moment_increase = moment_increase
 
     def respond(self, pressures):
-        response = self.homogeneous.respond(pressures)
+        response = super().respond(pressures)
         response["bending_moment"] *= 1 + self.moment_increase
-        return response.assign_attrs(model="equivalent-stiffness")
+        return response
 
 
 loads = theory.theoretical_pressures(outer_diameter=6.6, cover=20, buoyant_unit_weight=8.9e3, coefficient_at_rest=0.43)

@@ -7,12 +7,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from structure.beam_spring import BeamSpringLining
+    from structure.beams.lining import BeamSpringLining
     from structure.capacity import SegmentSection
     from structure.checks import CapacityRule, Limits, check
-    from structure.continuum import ContinuumLining
-    from structure.continuum_bolts import Bolts
-    from structure.continuum_mesh import GasketGroove, Gate
+    from structure.continuum.bolts import Bolts
+    from structure.continuum.lining import ContinuumLining
+    from structure.continuum.mesh import GasketGroove, Gate
     from structure.inputs import GushingWarning, InputError
     from structure.lining import LiningFailure, LiningModel, additional
     from structure.models import lining_model, lining_model_names, register_lining_model
@@ -33,11 +33,11 @@ _HOMES = {
     "Limits": "structure.checks",
     "CapacityRule": "structure.checks",
     "SegmentSection": "structure.capacity",
-    "BeamSpringLining": "structure.beam_spring",
-    "ContinuumLining": "structure.continuum",
-    "Gate": "structure.continuum_mesh",
-    "GasketGroove": "structure.continuum_mesh",
-    "Bolts": "structure.continuum_bolts",
+    "BeamSpringLining": "structure.beams.lining",
+    "ContinuumLining": "structure.continuum.lining",
+    "Gate": "structure.continuum.mesh",
+    "GasketGroove": "structure.continuum.mesh",
+    "Bolts": "structure.continuum.bolts",
     "lining_model": "structure.models",
     "lining_model_names": "structure.models",
     "register_lining_model": "structure.models",

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from structure.ring import Ring
@@ -23,19 +21,17 @@ def borne(ring: Ring) -> np.ndarray:
     return np.array([normal or tangential, normal or tangential, tangential])
 
 
-def even_loads(
-    theta: np.ndarray, by_pressure, by_shear, resultant: Callable[[np.ndarray], np.ndarray]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Nodal loads spread evenly over the outer face, each with one resultant of 1 N/m.
+def even_loads(theta: np.ndarray, by_pressure, by_shear, rigid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Loads spread evenly over the outer face, each with one resultant of 1 N/m.
 
     Parameters
     ----------
     theta : (n_theta,) float64
         [rad].
     by_pressure, by_shear : (n_unknowns, n_theta) sparse
-        Nodal forces per Pa at `theta`.
-    resultant : callable
-        Sum to the right, up, and clockwise couple over the centre-line radius of nodal forces (3, n_unknowns).
+        Loads per Pa at `theta`.
+    rigid : (3, n_unknowns) float64
+        As of :class:`structure.ring_forces.RingParts`.
 
     Returns
     -------
@@ -45,7 +41,7 @@ def even_loads(
         To the right, up and clockwise, the two other resultants zero.
     """
     raw = np.stack([by_pressure @ np.sin(theta), by_pressure @ np.cos(theta), by_shear @ np.ones(len(theta))])
-    sums = resultant(raw)
+    sums = raw @ rigid.T
     return raw[1] / sums[1, 1], np.linalg.solve(sums, raw)
 
 

@@ -19,8 +19,6 @@ __all__ = ["PRESSURES", "RESPONSE", "check_pressures"]  # of other modules, for 
 
 #: Angles of every response [degree]: those of the pressures of a run, so that the two meet in one expression.
 THETA = np.arange(360.0)
-#: Both sides of an angle [rad]: at a joint the mean of the two is given.
-SIDES = (-1e-9, 1e-9)
 
 
 class LiningFailure(RuntimeError):
@@ -39,6 +37,9 @@ class LiningFailure(RuntimeError):
 
 class LiningModel(ABC):
     """A structural model of the lining: pressures in, response out, one time after the other."""
+
+    #: What its responses are called after.
+    name = "own"
 
     @abstractmethod
     def respond(self, pressures: xr.Dataset) -> xr.Dataset:
@@ -65,7 +66,7 @@ class LiningModel(ABC):
         """
 
 
-def ring_attributes(ring: Ring, model: str) -> dict[str, str]:
+def origin(ring: Ring, model: str) -> dict[str, str]:
     """Where the answer of a lining model comes from: the model, the ring and what its ground bears."""
     attributes = {"Conventions": "CF-1.11", "model": model, "ring": ring.model_dump_json()}
     if ring.ground is not None:
@@ -75,13 +76,14 @@ def ring_attributes(ring: Ring, model: str) -> dict[str, str]:
 
 
 def response_dataset(
-    ring: Ring, pressures: xr.Dataset, fields: dict[str, np.ndarray], attributes: dict[str, Any]
+    ring: Ring, pressures: xr.Dataset, fields: dict[str, Any], model: str, details: dict[str, Any] | None = None
 ) -> xr.Dataset:
-    """Response to pressures with the schema's dimensions, units and names.
+    """Response to pressures with the schema's dimensions, units and names, and where it comes from.
 
-    fields : name of :data:`structure.response.RESPONSE` to array;  attributes : from :func:`ring_attributes`, and more.
+    fields : name of :data:`structure.response.RESPONSE` to array, of further variables to (dimensions, array,
+    attributes);  model : its name;  details : further attributes.
     """
-    variables = {name: (RESPONSE[name][0], values) for name, values in fields.items()}
+    variables = {name: (RESPONSE[name][0], value) if name in RESPONSE else value for name, value in fields.items()}
     joints = np.array(ring.joint_angles, dtype=float)
     axes = {
         "time": ("time", pressures["time"].values, pressures["time"].attrs),
@@ -89,11 +91,13 @@ def response_dataset(
         "joint": ("joint", np.arange(1, len(joints) + 1)),
         "joint_angle": ("joint", joints),
     }
-    title = f"response of the lining: {attributes['model']} model"
-    response = xr.Dataset(variables, coords=axes, attrs={"title": title, **attributes})
-    for name, variable in response.variables.items():
-        units, long_name = RESPONSE[name][1:] if name in RESPONSE else COORDINATES[name]
-        variable.attrs = {"units": units, "long_name": long_name} | variable.attrs
+    title = f"response of the lining: {model} model"
+    attributes = {"title": title} | origin(ring, model) | (details or {})
+    response = xr.Dataset(variables, coords=axes, attrs=attributes)
+    known = {name: meaning[-2:] for name, meaning in (COORDINATES | RESPONSE).items()}
+    for name in known.keys() & response.variables.keys():
+        units, long_name = known[name]
+        response[name].attrs = {"units": units, "long_name": long_name} | response[name].attrs
     if "inflow_mass" in pressures:
         response = response.assign_coords(inflow_mass=pressures["inflow_mass"])
     return response

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 ENTRY_POINTS = "gush.lining_models"
 
 _BUILT_IN = {
-    "beam-spring": "structure.beam_spring:BeamSpringLining",
-    "continuum": "structure.continuum:ContinuumLining",
+    "beam-spring": "structure.beams.lining:BeamSpringLining",
+    "continuum": "structure.continuum.lining:ContinuumLining",
 }
 _REGISTERED: dict[str, type[LiningModel]] = {}
 

@@ -1,4 +1,4 @@
-"""Laws of the springs: soil reaction over displacement, with its limit and tangent; joint faces."""
+"""The law of the soil springs: reaction over displacement, with its limit and tangent."""
 
 from __future__ import annotations
 
@@ -23,14 +23,6 @@ class SoilSpring(NamedTuple):
     stiffness: float
     limit: float
     pulls: bool
-
-
-class JointSpring(NamedTuple):
-    """Joint stiffness per metre of tunnel: normal, shear [N/m2], rotation [N m/rad/m]."""
-
-    normal: float
-    shear: float
-    rotation: float
 
 
 def limit_pressures(ground: Ground) -> tuple[float, float]:
@@ -80,15 +72,6 @@ def soil_springs(ring: Ring) -> tuple[SoilSpring, SoilSpring]:
     return (
         SoilSpring(stiffness, normal_limit, ground.two_way),
         SoilSpring(share * stiffness, tangential_limit, True),
-    )
-
-
-def joint_spring(ring: Ring) -> JointSpring:
-    """Springs of one joint per metre of tunnel: normal, shear and rotational."""
-    return JointSpring(
-        ring.joint_normal_stiffness,
-        ring.joint_shear_stiffness,
-        ring.joint_rotational_stiffness,
     )
 
 

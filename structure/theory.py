@@ -63,15 +63,7 @@ def theoretical_pressures(
     """
     import xarray as xr
 
-    if not 0 <= water_table_depth <= cover:
-        raise ValueError(
-            f"theoretical_pressures: water_table_depth must lie in [0, cover = {cover:g}] m, got {water_table_depth:g};"
-            " a table below the crown or above the ground is beyond this formula"
-        )
-    if water_table_depth > 0 and unit_weight_above_water is None:
-        raise ValueError(
-            "theoretical_pressures: unit_weight_above_water is needed for a water table below the surface, got none"
-        )
+    _refuse_water_table(cover, water_table_depth, unit_weight_above_water)
     theta = np.arange(0.0, 360.0, 1.0) if theta is None else np.asarray(theta, dtype=float)
     angle = np.radians(theta)
     depth_below_table = cover + outer_diameter / 2 * (1 - np.cos(angle)) - water_table_depth
@@ -100,6 +92,18 @@ def theoretical_pressures(
         },
         attrs={"title": "theoretical pressures: overburden with K0, hydrostatic water"},
     )
+
+
+def _refuse_water_table(cover, water_table_depth, unit_weight_above_water):
+    if not 0 <= water_table_depth <= cover:
+        raise ValueError(
+            f"theoretical_pressures: water_table_depth must lie in [0, cover = {cover:g}] m, got {water_table_depth:g};"
+            " a table below the crown or above the ground is beyond this formula"
+        )
+    if water_table_depth > 0 and unit_weight_above_water is None:
+        raise ValueError(
+            "theoretical_pressures: unit_weight_above_water is needed for a water table below the surface, got none"
+        )
 
 
 def curved_section_moment(

@@ -51,7 +51,8 @@ def simulated(monkeypatch):
 @pytest.fixture
 def written(tmp_path):
     """A file by another program: three times, inflow and gate, the ring as an attribute."""
-    from test_continuum_lining import pressures, ring
+    from rings import case_3_pressures as pressures
+    from rings import case_3_ring as ring
 
     base = pressures().isel(time=0, drop=True)
     times = xr.DataArray([0.0, 1.0, 2.0], dims="time", attrs={"units": "s"})

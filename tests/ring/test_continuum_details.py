@@ -4,22 +4,15 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-import xarray as xr
-from test_continuum_lining import JOINTS, ground, largest, pressures, ring
+from rings import FORCES, JOINTS, largest, tractions
+from rings import case_3_ground as ground
+from rings import case_3_pressures as pressures
+from rings import case_3_ring as ring
 
 from structure import Bolts, ContinuumLining, GasketGroove, LiningFailure
 
 GROOVE = GasketGroove(cover=0.05, height=0.04, depth=0.02)
 BOLTS = Bolts(offset=-0.05, length=0.4, stiffness=2e8)
-FORCES = ("axial_force", "shear_force", "bending_moment")
-
-
-def uniform_pressure():
-    values = {"soil_pressure": 3e5, "water_pressure": 0.0, "soil_shear": 0.0}
-    return xr.Dataset(
-        {name: (("time", "theta"), np.full((1, 360), value)) for name, value in values.items()},
-        coords={"time": [0.0], "theta": np.arange(0.0, 360.0, 1.0)},
-    )
 
 
 @pytest.fixture(scope="module")
@@ -58,9 +51,9 @@ def test_joint_with_a_groove_keeps_the_stiffnesses_of_the_ring(grooved):
 def test_groove_leaves_thrust_and_closure_as_they_are():
     # The faces touch off the centre line, but opening and rotation are those on it.
     model = ContinuumLining(ring(ground=None, concrete_unit_weight=0.0), groove=GROOVE)
-    response = model.respond(uniform_pressure()).isel(time=0)
+    response = model.respond(tractions(lambda a: 3e5)).isel(time=0)
     thrust = 3e5 * 3.3
-    plain = ContinuumLining(model.ring).respond(uniform_pressure()).isel(time=0)
+    plain = ContinuumLining(model.ring).respond(tractions(lambda a: 3e5)).isel(time=0)
     # 0.3 %: the moment of the curved section bends the ring between its unevenly spaced joints, with or without groove.
     np.testing.assert_allclose(response["joint_axial_force"], thrust, rtol=3e-3)
     np.testing.assert_allclose(response["joint_opening"], -thrust / 6e8, rtol=3e-3)
@@ -110,7 +103,7 @@ def test_bolts_pull_as_much_as_their_anchors_part(bolted):
 def test_bolts_and_joint_share_the_thrust_of_a_uniform_pressure():
     given = ring(ground=None, concrete_unit_weight=0.0)
     model = ContinuumLining(given, bolts=(0.0, 0.4, 2e8))
-    response = model.respond(uniform_pressure()).isel(time=0)
+    response = model.respond(tractions(lambda a: 3e5)).isel(time=0)
     thrust = 3e5 * 3.3
     # The anchors come closer by (N + F)(1/k_n + L/EA) = -F/k_b, where the pull F < 0 relieves joint and concrete.
     soft = 1 / 6e8 + 0.4 / given.axial_stiffness

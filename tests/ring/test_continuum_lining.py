@@ -4,61 +4,17 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-import xarray as xr
-from test_ring_case_3 import BUOYANT_UNIT_WEIGHT, K0, VERTICAL
-from test_ring_joints_and_springs import mirrored
-from test_ring_joints_and_springs import pressures as gushing_pressures
+from rings import FORCES, JOINTS, largest, mirrored, tractions
+from rings import case_3_ground as ground
+from rings import case_3_pressures as pressures
+from rings import case_3_ring as ring
+from rings import pressures as gushing_pressures
 
-from structure import BeamSpringLining, ContinuumLining, Ground, LiningFailure, Ring, theory
+from structure import BeamSpringLining, ContinuumLining, LiningFailure, theory
 from structure.lining import RESPONSE
 from verification.problems import exact_rings
 
-JOINTS = (8.0, 73.0, 138.0, 222.0, 287.0, 352.0)
 BOTH = pytest.mark.parametrize("model", [BeamSpringLining, ContinuumLining])
-
-
-def ground(**changes):
-    values = dict(
-        youngs_modulus=40e6,
-        poissons_ratio=0.3,
-        cohesion=0.0,
-        friction_angle=25.0,
-        vertical_stress=VERTICAL,
-        horizontal_stress=K0 * VERTICAL,
-        slip_at="centre_line",
-    )
-    return Ground(**(values | changes))
-
-
-def ring(**changes):
-    """The ring of case 3."""
-    values = dict(
-        outer_diameter=6.6,
-        inner_diameter=5.9,
-        concrete_modulus=34.5e9,
-        concrete_poissons_ratio=0.2,
-        concrete_unit_weight=25e3,
-        joint_angles=JOINTS,
-        joint_rotational_stiffness=5e8,
-        joint_normal_stiffness=6e8,
-        joint_shear_stiffness=8e7,
-        ground=ground(),
-        balance_uplift=True,
-    )
-    return Ring(**(values | changes))
-
-
-def pressures(factor=1.0, where=None):
-    """Initial pressures of case 3 from theory, times a factor, zero where told."""
-    loads = theory.theoretical_pressures(
-        outer_diameter=6.6, cover=20.0, buoyant_unit_weight=BUOYANT_UNIT_WEIGHT, coefficient_at_rest=K0
-    )
-    loads = loads.map(lambda variable: variable * factor, keep_attrs=True)
-    return loads if where is None else loads.where(where(loads["theta"]), 0.0)
-
-
-def largest(values):
-    return float(np.nanmax(np.abs(values)))
 
 
 def curved_section(given, axial_force):
@@ -129,7 +85,7 @@ def test_joint_section_has_the_three_stiffnesses_of_the_ring(rotational):
     given = ring(joint_rotational_stiffness=rotational)
     model = ContinuumLining(given)
     response = model.respond(pressures()).isel(time=0)
-    for name in ("axial_force", "shear_force", "bending_moment"):
+    for name in FORCES:
         # Forces of the joint's laws against stresses integrated beside it.
         beside = response[name].sel(theta=list(JOINTS))
         # 1e-3 of the largest: discretisation.
@@ -182,14 +138,7 @@ def test_newton_converges_quadratically():
 def refinement_errors(columns, layers):
     """Errors of displacement and of N, Q, M against the exact thick ring under cos 2 theta, (4,)."""
     free = ring(joint_angles=(), ground=None, balance_uplift=False, concrete_unit_weight=0.0)
-    degrees = np.arange(0.0, 360.0, 0.25)
-    zero = np.zeros((1, len(degrees)))
-    load = 6e4 * np.cos(2 * np.radians(degrees))[None]
-    fields = dict(soil_pressure=load, water_pressure=zero, soil_shear=zero)
-    loads = xr.Dataset(
-        {name: (("time", "theta"), values) for name, values in fields.items()},
-        coords={"time": [0.0], "theta": degrees},
-    )
+    loads = tractions(lambda angle: 6e4 * np.cos(2 * angle), step=0.25)
     response = ContinuumLining(free, columns=columns, layers=layers).respond(loads).isel(time=0)
     exact = exact_rings.thick_ring_cos2(6e4, 0.0, 2.95, 3.3, 34.5e9, 0.2)
     across = np.linspace(2.95, 3.3, 2001)
@@ -197,11 +146,8 @@ def refinement_errors(columns, layers):
     expected = exact_rings.radial_cos2(6e4 * 3.3 / 3.125, 3.125, np.radians(response["theta"].values))
     return np.array(
         [abs(response["convergence_vertical"].item() / (-2 * moved) - 1)]
-        + [largest(response[name] - getattr(expected, name)) / largest(getattr(expected, name)) for name in RING_FORCES]
+        + [largest(response[name] - getattr(expected, name)) / largest(getattr(expected, name)) for name in FORCES]
     )
-
-
-RING_FORCES = ("axial_force", "shear_force", "bending_moment")
 
 
 def test_convergence_rate_of_displacement_and_section_forces():

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from rings import case_3_pressures as pressures
+from rings import case_3_ring as ring
 from running import gush
-from test_continuum_lining import pressures, ring
 
 import structure
 from coupling.datasets import read_response

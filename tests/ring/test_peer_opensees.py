@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_ring_joints_and_springs import ground, pressures, ring
+from rings import ground, pressures, ring
 
 from structure import BeamSpringLining
+from structure.beams.mesh import forces_at
 from structure.springs import soil_springs
 
 PROGRAM = Path(__file__).with_name("opensees_ring.py")
@@ -79,15 +80,14 @@ def largest_differences(lining, changes_of=None, loads=None):
     model = BeamSpringLining(lining)
     loads = pressures() if loads is None else loads
     response = model.respond(loads).isel(time=0)
-    angle = np.radians(loads["theta"].values)
-    pressure = loads["soil_pressure"] + loads["water_pressure"]
-    nodal = model._loads(angle, pressure, loads["soil_shear"].values)[0][0].reshape(-1, 3)
+    nodal = model.loads(loads)[0].reshape(-1, 3)
+    at_theta = forces_at(model.mesh, np.radians(response["theta"].values))
     peer = ask_opensees(model, nodal, changes_of(response) if changes_of else None)
     if lining.ground is not None:
         # some springs press and some are open, or the comparison would say nothing about them
         assert response["displacement_radial"].min() < 0 < response["displacement_radial"].max()
     pairs = {
-        name: (response[name].values, model._forces_at @ peer["forces"][:, column])
+        name: (response[name].values, at_theta @ peer["forces"][:, column])
         for column, name in enumerate(("axial_force", "shear_force", "bending_moment"))
     }
     for kind, names in (
@@ -98,7 +98,7 @@ def largest_differences(lining, changes_of=None, loads=None):
             if len(lining.joint_angles):
                 pairs[name] = (response[name].values, peer[kind][:, column])
     if lining.ground is not None:
-        radial = model._movement[0] @ peer["displacement"].ravel()
+        radial = model.readings.movement[0] @ peer["displacement"].ravel()
         ours = np.stack([response[f"convergence_{way}"].values for way in ("vertical", "horizontal")])
         pairs["convergence"] = (ours, -(radial[[0, 90]] + radial[[180, 270]]))
     return {name: np.abs(one - other).max() / np.abs(other).max() for name, (one, other) in pairs.items()}

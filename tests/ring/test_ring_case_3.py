@@ -9,45 +9,21 @@ that option was added after comparing with the table, so it explains the gap and
 
 import numpy as np
 import pytest
+from rings import BUOYANT_UNIT_WEIGHT, case_3_ground, case_3_pressures, case_3_ring
 
-from structure import BeamSpringLining, Ground, Ring, theory
+from structure import BeamSpringLining
 
 THICKNESS = 0.35
-BUOYANT_UNIT_WEIGHT = 0.55 * (2650 - 1000) * 9.81
-K0 = 0.3 / 0.7
-VERTICAL = 23.3 * BUOYANT_UNIT_WEIGHT
 AXIAL_FORCE = np.array([1185, 1452, 1289, 1290, 1452, 1185]) * 1e3
 BENDING_MOMENT = np.array([-178, 147, 3.5, 4.5, 146, -178]) * 1e3
 
 
 def initial_response(slip_at, per_face_area=False):
     share = THICKNESS if per_face_area else 1.0
-    ground = Ground(
-        youngs_modulus=40e6,
-        poissons_ratio=0.3,
-        cohesion=0.0,
-        friction_angle=25.0,
-        vertical_stress=VERTICAL,
-        horizontal_stress=K0 * VERTICAL,
-        slip_at=slip_at,
+    ring = case_3_ring(
+        ground=case_3_ground(slip_at=slip_at), joint_normal_stiffness=6e8 * share, joint_shear_stiffness=8e7 * share
     )
-    ring = Ring(
-        outer_diameter=6.6,
-        inner_diameter=6.6 - 2 * THICKNESS,
-        concrete_modulus=34.5e9,
-        concrete_poissons_ratio=0.2,
-        concrete_unit_weight=25e3,
-        joint_angles=(8.0, 73.0, 138.0, 222.0, 287.0, 352.0),
-        joint_rotational_stiffness=5e8,
-        joint_normal_stiffness=6e8 * share,
-        joint_shear_stiffness=8e7 * share,
-        ground=ground,
-        balance_uplift=True,
-    )
-    pressures = theory.theoretical_pressures(
-        outer_diameter=6.6, cover=20.0, buoyant_unit_weight=BUOYANT_UNIT_WEIGHT, coefficient_at_rest=K0
-    )
-    return BeamSpringLining(ring).respond(pressures).isel(time=0)
+    return BeamSpringLining(ring).respond(case_3_pressures()).isel(time=0)
 
 
 def moment_error(response):

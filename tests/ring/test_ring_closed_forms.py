@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-import xarray as xr
+from rings import ground, tractions
 
-from structure import BeamSpringLining, ContinuumLining, Ground, Ring, theory
+from structure import BeamSpringLining, ContinuumLining, Ring, theory
 from verification.problems import exact_rings
 
 THIN = 0.02  # thickness over radius; stretching then changes displacements by (t/R)^2/12 = 3e-5
@@ -21,18 +21,6 @@ def ring(thickness=0.35, **changes):
     return Ring(**(values | changes))
 
 
-def pressures(radial, shear=None):
-    """Pressures of one time from functions of theta [rad]."""
-    degrees = np.arange(0.0, 360.0, 1.0)
-    angle = np.radians(degrees)
-    zero = np.zeros_like(angle)
-    fields = dict(soil_pressure=radial(angle) + zero, water_pressure=zero, soil_shear=shear(angle) if shear else zero)
-    return xr.Dataset(
-        {name: (("time", "theta"), values[None]) for name, values in fields.items()},
-        coords={"time": [0.0], "theta": degrees},
-    )
-
-
 BOTH = pytest.mark.parametrize("model", [BeamSpringLining, ContinuumLining])
 
 
@@ -47,7 +35,7 @@ def angles(response):
 @BOTH
 def test_uniform_pressure_gives_thrust_on_the_outer_face_and_no_moment(model):
     free = ring()
-    response = model(free).respond(pressures(lambda a: 3e5))
+    response = model(free).respond(tractions(lambda a: 3e5))
     thrust = exact_rings.uniform_pressure(3e5, free.outer_radius, angles(response)).axial_force
     # 5e-5: the load polygon of one-degree chords, span^2/24 = 1.3e-5, and as much from the linear shares.
     assert relative_error(response, "axial_force", thrust) < 5e-5
@@ -62,7 +50,7 @@ def test_uniform_pressure_gives_thrust_on_the_outer_face_and_no_moment(model):
 @BOTH
 def test_cos2_pressure_gives_the_equilibrium_forces(model):
     free = ring()
-    response = model(free).respond(pressures(lambda a: 6e4 * np.cos(2 * a)))
+    response = model(free).respond(tractions(lambda a: 6e4 * np.cos(2 * a)))
     on_centre_line = 6e4 * free.outer_radius / free.centre_radius
     expected = exact_rings.radial_cos2(on_centre_line, free.centre_radius, angles(response))
     for name in expected._fields:
@@ -73,7 +61,7 @@ def test_cos2_pressure_gives_the_equilibrium_forces(model):
 @pytest.mark.parametrize("section", ["timoshenko", "euler-bernoulli"])
 def test_cos2_displacement_includes_bending_stretching_and_shear(section):
     free = ring(section=section)
-    response = BeamSpringLining(free).respond(pressures(lambda a: 6e4 * np.cos(2 * a)))
+    response = BeamSpringLining(free).respond(tractions(lambda a: 6e4 * np.cos(2 * a)))
     expected = exact_rings.radial_cos2_displacement(
         6e4 * free.outer_radius / free.centre_radius,
         free.centre_radius,
@@ -89,14 +77,7 @@ def test_cos2_displacement_includes_bending_stretching_and_shear(section):
 @pytest.mark.parametrize("tangential", [0.0, 3e4])
 def test_continuum_has_the_displacements_and_stresses_of_the_exact_thick_ring(tangential):
     free = ring()
-    degrees = np.arange(0.0, 360.0, 0.25)
-    angle = np.radians(degrees)
-    zero = np.zeros_like(angle)
-    fields = dict(soil_pressure=6e4 * np.cos(2 * angle), water_pressure=zero, soil_shear=tangential * np.sin(2 * angle))
-    loads = xr.Dataset(
-        {name: (("time", "theta"), values[None]) for name, values in fields.items()},
-        coords={"time": [0.0], "theta": degrees},
-    )
+    loads = tractions(lambda a: 6e4 * np.cos(2 * a), lambda a: tangential * np.sin(2 * a), step=0.25)
     exact = exact_rings.thick_ring_cos2(6e4, tangential, free.inner_diameter / 2, free.outer_radius, 34.5e9, 0.2)
     model = ContinuumLining(free)
     across = np.linspace(free.inner_diameter / 2, free.outer_radius, 2001)
@@ -114,7 +95,7 @@ def test_continuum_has_the_displacements_and_stresses_of_the_exact_thick_ring(ta
 @BOTH
 def test_thin_ring_deflects_by_plane_strain_bending_alone(model):
     thin = ring(thickness=THIN * 3.125)
-    response = model(thin).respond(pressures(lambda a: 1e2 * np.cos(2 * a)))
+    response = model(thin).respond(tractions(lambda a: 1e2 * np.cos(2 * a)))
     # Written out, so that the ring's own property is checked too: a tunnel is in plane strain.
     bending_stiffness = 34.5e9 / (1 - 0.2**2) * (THIN * 3.125) ** 3 / 12
     expected = exact_rings.radial_cos2_displacement(
@@ -127,7 +108,7 @@ def test_thin_ring_deflects_by_plane_strain_bending_alone(model):
 @BOTH
 def test_shear_acts_on_the_outer_face_with_its_couple(model):
     free = ring()
-    response = model(free).respond(pressures(lambda a: 0.0, lambda a: 6e4 * np.sin(2 * a)))
+    response = model(free).respond(tractions(lambda a: 0.0, lambda a: 6e4 * np.sin(2 * a)))
     ratio = free.outer_radius / free.centre_radius
     force = exact_rings.tangential_sin2(6e4 * ratio, free.centre_radius, angles(response))
     couple = exact_rings.distributed_couple_sin2(6e4 * ratio * free.thickness / 2, free.centre_radius, angles(response))
@@ -139,7 +120,7 @@ def test_shear_acts_on_the_outer_face_with_its_couple(model):
 @BOTH
 def test_self_weight_on_a_point_support(model):
     thin = ring(thickness=THIN * 3.125, concrete_unit_weight=25e3, support="invert")
-    response = model(thin).respond(pressures(lambda a: 0.0))
+    response = model(thin).respond(tractions(lambda a: 0.0))
     weight = 25e3 * thin.thickness
     angle = angles(response)
     right = angle < np.pi
@@ -157,21 +138,11 @@ def test_self_weight_on_a_point_support(model):
 @pytest.mark.parametrize("thickness", [THIN * 3.125, 0.35])
 @pytest.mark.parametrize("tangential", [False, True])
 def test_winkler_ring_under_cos2_pressure_and_shear(model, thickness, tangential):
-    soil = Ground(
-        youngs_modulus=40e6,
-        poissons_ratio=0.3,
-        cohesion=0.0,
-        friction_angle=25.0,
-        vertical_stress=2e5,
-        horizontal_stress=1e5,
-        law="linear",
-        two_way=True,
-        tangential_springs=tangential,
-    )
+    soil = ground(law="linear", two_way=True, tangential_springs=tangential)
     beam = model is BeamSpringLining
     embedded = ring(thickness=thickness, ground=soil, section="euler-bernoulli" if beam else "timoshenko")
     shear = (lambda a: 1e4 * np.sin(2 * a)) if tangential else None
-    response = model(embedded).respond(pressures(lambda a: 2e4 * np.cos(2 * a), shear))
+    response = model(embedded).respond(tractions(lambda a: 2e4 * np.cos(2 * a), shear))
     normal = 4 / 1.3 * 40e6 / embedded.outer_diameter
     stiffness = embedded.bending_stiffness
     if not beam:
@@ -206,7 +177,7 @@ def test_hinged_ring_closes_its_rotations(model):
         joint_normal_stiffness=1e13,
         joint_shear_stiffness=1e13,
     )
-    response = model(hinged).respond(pressures(lambda a: 1e2 * np.cos(2 * a)))
+    response = model(hinged).respond(tractions(lambda a: 1e2 * np.cos(2 * a)))
     load = 1e2 * hinged.outer_radius / hinged.centre_radius
     rigid = exact_rings.radial_cos2(load, hinged.centre_radius, np.radians(sorted(joints))).bending_moment
     expected = exact_rings.hinge_moments(rigid, 2e5, hinged.centre_radius, hinged.bending_stiffness)
@@ -223,7 +194,7 @@ def test_opposite_point_loads(model):
     # A hat one degree wide to either side at crown and invert is the closest a sampled pressure comes to a point load.
     force = 1e3
     peak = force / (free.outer_radius * np.radians(1.0))
-    loaded = pressures(lambda a: np.where(np.isclose(a % np.pi, 0), peak, 0.0))
+    loaded = tractions(lambda a: np.where(np.isclose(a % np.pi, 0), peak, 0.0))
     response = model(free).respond(loaded)
     angle = angles(response)
     away = (angle > np.radians(3)) & (angle < np.radians(177))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_ring_joints_and_springs import ground, pressures, ring
+from rings import ground, pressures, ring
 
 from structure import BeamSpringLining, LiningFailure, theory
 

@@ -6,58 +6,11 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
+from rings import JOINTS, ground, mirrored, pressures, ring
 
-from structure import BeamSpringLining, ContinuumLining, Ground, InputError, LiningFailure, Ring, theory
-from structure.beam_geometry import RingMesh
+from structure import BeamSpringLining, ContinuumLining, InputError, LiningFailure, theory
+from structure.beams.mesh import RingMesh
 from structure.springs import SoilSpring, limit_pressures, soil_reaction
-
-JOINTS = (8.0, 73.0, 138.0, 222.0, 287.0, 352.0)
-
-
-def ground(**changes):
-    values = dict(
-        youngs_modulus=40e6,
-        poissons_ratio=0.3,
-        cohesion=0.0,
-        friction_angle=25.0,
-        vertical_stress=2.07e5,
-        horizontal_stress=8.9e4,
-    )
-    return Ground(**(values | changes))
-
-
-def ring(**changes):
-    values = dict(
-        outer_diameter=6.6,
-        inner_diameter=5.9,
-        concrete_modulus=34.5e9,
-        concrete_poissons_ratio=0.2,
-        concrete_unit_weight=25e3,
-        joint_angles=JOINTS,
-        joint_rotational_stiffness=5e8,
-        joint_normal_stiffness=6e8,
-        joint_shear_stiffness=8e7,
-        ground=ground(),
-    )
-    return Ring(**(values | changes))
-
-
-def pressures(n_times=1):
-    """Theory pressures, falling around 90 degrees as time goes on."""
-    base = theory.theoretical_pressures(
-        outer_diameter=6.6, cover=20.0, buoyant_unit_weight=8900.0, coefficient_at_rest=3 / 7
-    )
-    times = np.arange(n_times, dtype=float)
-    fall = xr.DataArray(np.linspace(0, 0.9, n_times), dims="time") * np.exp(-(((base["theta"] - 90) / 15) ** 2))
-    moved = {
-        name: (base[name].isel(time=0, drop=True) * (1 - fall)).transpose("time", "theta") for name in base.data_vars
-    }
-    return xr.Dataset(moved).assign_coords(time=times)
-
-
-def mirrored(dataset):
-    swapped = dataset.assign_coords(theta=(360 - dataset["theta"]) % 360).sortby("theta")
-    return swapped.assign(soil_shear=-swapped["soil_shear"])
 
 
 @pytest.mark.parametrize("n_elements", [360, 100, 77])

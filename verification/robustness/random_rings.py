@@ -124,7 +124,7 @@ def reason(model, ring, loads, refusal):
     """What a refusal blames, in a few words, and whether that is so.
 
     Joints are rightly blamed where they lack the stiffness that the refusal names, or where the ring is solved once
-    they have it. The continuum says that joints are too weak and not which.
+    they have it. What breaks down names no joint.
     """
     way = re.search(rf"degrees\) ({'|'.join(WAYS)}) most freely", refusal)
     blamed = [WAYS[way[1]]] if way else [*WAYS.values()] if "joints" in refusal else []

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from structure.beam_geometry import arc_pieces, sampled_operator
-from structure.continuum_mesh import EDGE_MEAN, ContinuumMesh
-from structure.continuum_sections import column_means, edge_shapes
+from structure.arcs import arc_pieces, sampled_operator
+from structure.continuum.mesh import EDGE_MEAN, ContinuumMesh
+from structure.continuum.sections import column_means, edge_shapes
 from structure.ring import Ring
 
 
@@ -60,8 +60,6 @@ def spring_feelers(ring: Ring, mesh: ContinuumMesh) -> tuple[sparse.csr_array, n
     """
     edges = mesh.column_angles()
     area = ring.outer_radius * mesh.column_share * (edges[:, 2] - edges[:, 0])
-    outer = np.zeros(mesh.n_levels)
-    outer[-1] = 1.0
     count = len(mesh.column_lines)
     unknowns = 2 * (mesh.column_lines * mesh.n_levels + mesh.n_levels - 1)
     rows = np.repeat(np.arange(count), 3)

@@ -117,91 +117,42 @@ class ContinuumMesh:
         self.level_mean = np.zeros(2 * layers + 1)
         for layer, height in enumerate(self.layer_height):
             self.level_mean[2 * layer : 2 * layer + 3] += EDGE_MEAN * height / ring.thickness
-        self._centre_radius = ring.centre_radius
-        self._groove_span = 0.0 if groove is None else groove.depth / ring.centre_radius
-        self._line_offsets = [offset for offset in (self._groove_span, anchor_angle) if offset]
-        boundaries = self._boundaries(ring, strip_width, gate)
-        bridge = 0.0 if gate is None else 1 - gate.cut
-        angles, column_lines, strips, shares, before, after, grooved = [], [], [], [], [], [], []
-        closed = not boundaries
-        for index, (start, end) in enumerate(self._bodies(boundaries)):
-            first = sum(map(len, angles))
-            at_joint = [not closed and boundaries[(index + k) % len(boundaries)].is_joint for k in (0, 1)]
-            body = self._body_lines(start, end, columns, at_joint)
-            count = len(body) // 2
-            angles.append(body[:-1] if closed else body)
-            counts = [count]
-            if not closed:
-                boundary = boundaries[(index + 1) % len(boundaries)]
-                turn = 0 if index + 1 < len(boundaries) else 2 * np.pi
-                counts.append(int(strip_width > 0) if boundary.is_joint else BRIDGE_COLUMNS * (bridge > 0))
-                half = boundary.width / 2 / ring.centre_radius
-                inside = np.linspace(-half, half, 2 * counts[1] + 1)[1:-1] if counts[1] else np.zeros(0)
-                angles.append(boundary.angle + turn + inside)
-                if boundary.is_joint:
-                    before.append(first + 2 * counts[0])
-                    after.append(before[-1] + max(2 * counts[1], 1))
-            column_lines += [(first + 2 * k, first + 2 * k + 1, first + 2 * k + 2) for k in range(sum(counts))]
-            fills_joint = not closed and boundary.is_joint
-            strips += [False] * counts[0] + [fills_joint] * sum(counts[1:])
-            shares += [1.0] * counts[0] + [1.0 if fills_joint else bridge] * sum(counts[1:])
-            beside = np.zeros(sum(counts), dtype=bool)
-            middle = body[1::2]
-            beside[:count] = at_joint[0] & (middle < start + self._groove_span)
-            beside[:count] |= at_joint[1] & (middle > end - self._groove_span)
-            grooved.append(beside)
-        self.angle = np.concatenate(angles)
-        self.n_lines, self.n_levels = len(self.angle), len(self.radius)
-        self.column_lines = np.array(column_lines) % self.n_lines
-        self.column_is_strip, self.column_share = np.array(strips), np.array(shares)
-        middle = ring.outer_radius - self.radius[1::2]
-        #: Layers of the groove, (layers,) bool.
         self.groove_layers = np.zeros(layers, dtype=bool)
         if groove is not None:
-            self.groove_layers = (middle > groove.cover) & (middle < groove.cover + groove.height)
-        self.is_groove = np.concatenate(grooved)[:, None] & self.groove_layers
-        # The body after the first boundary comes first, so the joint at its start is met last.
-        joints = np.argsort([self.angle[line] % (2 * np.pi) for line in np.array(after, dtype=int) % self.n_lines])
-        self.joint_before = np.array(before, dtype=int)[joints]
-        self.joint_after = np.array(after, dtype=int)[joints] % self.n_lines
+            depth = ring.outer_radius - self.radius[1::2]
+            self.groove_layers = (depth > groove.cover) & (depth < groove.cover + groove.height)
+        self._columns(ring, columns, strip_width, gate, groove, anchor_angle)
+        self.n_lines, self.n_levels = len(self.angle), len(self.radius)
 
-    def _body_lines(self, start: float, end: float, columns: int, at_joint: list[bool]) -> np.ndarray:
-        """Angles of the lines of a body, two per column and one more; anchors and the groove's ends lie on lines."""
-        inner = [start, end]
-        for offset in (offset for offset in self._line_offsets if offset < end - start):
-            inner += [start + offset] * at_joint[0] + [end - offset] * at_joint[1]
-        # Anchors of both ends may meet; lines closer than this are one.
-        corners = np.sort(inner)
-        corners = corners[np.append(True, np.diff(corners) > 1e-6)]
-        counts = np.maximum(1, np.rint(np.diff(corners) / (2 * np.pi) * columns)).astype(int)
-        parts = [np.linspace(corners[k], corners[k + 1], 2 * count + 1)[int(k > 0) :] for k, count in enumerate(counts)]
-        return np.concatenate(parts)
-
-    @staticmethod
-    def _boundaries(ring: Ring, strip_width: float, gate: Gate | None) -> list[Boundary]:
-        boundaries = [Boundary(np.radians(angle), strip_width, True) for angle in ring.joint_angles]
-        if gate is not None:
-            boundaries.append(Boundary(np.radians(gate.angle % 360), gate.width, False))
-        return sorted(boundaries)
-
-    def _bodies(self, boundaries: list[Boundary]) -> list[tuple[float, float]]:
-        """Angles of the start and of the end of each body of concrete [rad]."""
-        if not boundaries:
-            return [(0.0, 2 * np.pi)]
-        bodies = []
-        for index, boundary in enumerate(boundaries):
-            following = boundaries[(index + 1) % len(boundaries)]
-            turn = 0 if index + 1 < len(boundaries) else 2 * np.pi
-            start = boundary.angle + boundary.width / 2 / self._centre_radius
-            end = following.angle + turn - following.width / 2 / self._centre_radius
-            if end - start < np.radians(0.5):
-                raise ValueError(
-                    f"ring: joints and gate must leave at least 0.5 degrees of concrete between them, got"
-                    f" {np.degrees(end - start):.3g} degrees after {np.degrees(boundary.angle):g} degrees;"
-                    " move the gate, or make it or the joint strip narrower"
-                )
-            bodies.append((start, end))
-        return bodies
+    def _columns(self, ring, columns, strip_width, gate, groove, anchor_angle):
+        """Columns of every body of concrete and of what fills the place after it: a strip, what bridges a hole."""
+        groove_span = 0.0 if groove is None else groove.depth / ring.centre_radius
+        offsets = [offset for offset in (groove_span, anchor_angle) if offset]
+        bridge = 0.0 if gate is None else 1 - gate.cut
+        boundaries = _boundaries(ring, strip_width, gate)
+        cells, joints = [], []  # of every column: begin, end, is it a strip, its share, is it beside a groove, a cut
+        for index, (start, end) in enumerate(_bodies(ring, boundaries)):
+            at_joint = [bool(boundaries) and boundaries[(index + k) % len(boundaries)].is_joint for k in (0, 1)]
+            for a, b in pairwise(_body_edges(start, end, columns, offsets, at_joint)):
+                beside = at_joint[0] and (a + b) / 2 < start + groove_span
+                cells.append([a, b, False, 1.0, beside or (at_joint[1] and (a + b) / 2 > end - groove_span), False])
+            filling = int(strip_width > 0) if at_joint[1] else BRIDGE_COLUMNS * (bridge > 0)
+            if boundaries:
+                after = boundaries[(index + 1) % len(boundaries)]
+                joints += [(after.angle, len(cells) - 1, len(cells) + filling)] * after.is_joint
+                cells[-1][-1] = not filling
+                for a, b in pairwise(np.linspace(end, end + after.width / ring.centre_radius, filling + 1)):
+                    cells.append([a, b, after.is_joint, 1.0 if after.is_joint else bridge, False, False])
+        begin, end, self.column_is_strip, self.column_share, beside, cut = map(np.array, zip(*cells, strict=True))
+        self.is_groove = beside[:, None] & self.groove_layers
+        # Where nothing fills the place between two bodies, a column has a last line of its own.
+        first = 2 * np.arange(len(cut)) + np.cumsum(cut) - cut
+        last = np.where(cut, first + 2, np.roll(first, -1))
+        self.column_lines = np.stack([first, first + 1, last], axis=1)
+        self.angle = np.zeros(2 * len(cut) + cut.sum())
+        self.angle[last], self.angle[first], self.angle[first + 1] = end, begin, (begin + end) / 2
+        _, before, after = np.array(sorted(joints)).reshape(-1, 3).T.astype(int)
+        self.joint_before, self.joint_after = last[before], first[after % len(cut)]
 
     @property
     def node_angle(self) -> np.ndarray:
@@ -251,11 +202,6 @@ class ContinuumMesh:
                 column[index], place[index] = best, share[best]
         return column, place
 
-    def neighbour_place(self) -> np.ndarray:
-        """(n_lines,) place of each line when the ring is folded flat, which closes it inside a narrow band."""
-        line = np.arange(self.n_lines)
-        return np.where(2 * line < self.n_lines, 2 * line, 2 * (self.n_lines - line) - 1)
-
 
 def _layer_edges(ring: Ring, layers: int, groove: GasketGroove | None) -> np.ndarray:
     """Radii between the layers: even, but lines at the edges of the groove."""
@@ -266,3 +212,43 @@ def _layer_edges(ring: Ring, layers: int, groove: GasketGroove | None) -> np.nda
     counts = [max(1, round((b - a) / ring.thickness * layers)) for a, b in pairwise(corners)]
     parts = [np.linspace(a, b, n + 1)[1:] for (a, b), n in zip(pairwise(corners), counts, strict=True)]
     return np.concatenate([[inner], *parts])
+
+
+def _boundaries(ring: Ring, strip_width: float, gate: Gate | None) -> list[Boundary]:
+    boundaries = [Boundary(np.radians(angle), strip_width, True) for angle in ring.joint_angles]
+    if gate is not None:
+        boundaries.append(Boundary(np.radians(gate.angle % 360), gate.width, False))
+    return sorted(boundaries)
+
+
+def _bodies(ring: Ring, boundaries: list[Boundary]) -> list[tuple[float, float]]:
+    """Angles of the start and of the end of each body of concrete [rad]."""
+    if not boundaries:
+        return [(0.0, 2 * np.pi)]
+    bodies = []
+    for index, boundary in enumerate(boundaries):
+        following = boundaries[(index + 1) % len(boundaries)]
+        turn = 0 if index + 1 < len(boundaries) else 2 * np.pi
+        start = boundary.angle + boundary.width / 2 / ring.centre_radius
+        end = following.angle + turn - following.width / 2 / ring.centre_radius
+        if end - start < np.radians(0.5):
+            raise ValueError(
+                f"ring: joints and gate must leave at least 0.5 degrees of concrete between them, got"
+                f" {np.degrees(end - start):.3g} degrees after {np.degrees(boundary.angle):g} degrees;"
+                " move the gate, or make it or the joint strip narrower"
+            )
+        bodies.append((start, end))
+    return bodies
+
+
+def _body_edges(start: float, end: float, columns: int, offsets: list[float], at_joint: list[bool]) -> np.ndarray:
+    """Angles between the columns of a body; anchors and the groove's ends, `offsets` from a joint, lie on them."""
+    inner = [start, end]
+    for offset in (offset for offset in offsets if offset < end - start):
+        inner += [start + offset] * at_joint[0] + [end - offset] * at_joint[1]
+    # Anchors of both ends may meet; lines closer than this are one.
+    corners = np.sort(inner)
+    corners = corners[np.append(True, np.diff(corners) > 1e-6)]
+    counts = np.maximum(1, np.rint(np.diff(corners) / (2 * np.pi) * columns)).astype(int)
+    parts = [np.linspace(a, b, count + 1)[1:] for (a, b), count in zip(pairwise(corners), counts, strict=True)]
+    return np.concatenate([[start], *parts])

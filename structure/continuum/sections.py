@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from structure.continuum_mesh import ContinuumMesh
-from structure.continuum_stiffness import STRESS_POINTS, StressOperators
+from structure.continuum.concrete import STRESS_POINTS, Stresses
+from structure.continuum.mesh import ContinuumMesh
 
 
 def section_forces(
-    mesh: ContinuumMesh, stresses: StressOperators, centre_radius: float, theta: np.ndarray
+    mesh: ContinuumMesh, stresses: Stresses, centre_radius: float, theta: np.ndarray
 ) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array]:
     """N, Q and M at angles theta [rad] from the unknowns, (n_theta, n_unknowns) each; rows in the opening are zero.
 
@@ -56,7 +56,7 @@ def _between_stations(mesh: ContinuumMesh, theta: np.ndarray) -> sparse.csr_arra
     ).tocsr()
 
 
-def _section_integrals(mesh: ContinuumMesh, stresses: StressOperators, centre_radius: float):
+def _section_integrals(mesh: ContinuumMesh, stresses: Stresses, centre_radius: float):
     """Integrals of a stress, and of it times (r - R), across the stations, (2 n_columns, n_points) sparse each."""
     count, layers = len(mesh.column_lines), mesh.layers
     point = np.arange(4 * layers * count).reshape(count, layers, 2, 2)

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from structure.continuum_mesh import ContinuumMesh
-from structure.continuum_sections import edge_shapes
+from structure.continuum.mesh import ContinuumMesh
+from structure.continuum.sections import edge_shapes
 from structure.ring import Ring
 
 
@@ -96,11 +96,11 @@ def bolt_shares(ring: Ring, bolts: Bolts, theta: np.ndarray) -> tuple[np.ndarray
     return -along, np.where(cut, -np.sin(lean), 0.0), along * (from_axis - ring.centre_radius)
 
 
-def near_anchors(ring: Ring, bolts: Bolts, angle: np.ndarray, distance: float) -> np.ndarray:
-    """Whether an anchor lies within a distance [rad] of angles [rad], (n,) bool: its pull is concentrated there."""
+def near_anchors(ring: Ring, bolts: Bolts, angle: np.ndarray) -> np.ndarray:
+    """Whether an anchor lies within 3.5 degrees of angles [rad], (n,) bool: its pull is concentrated there."""
     half_angle, _ = anchor_place(ring, bolts)
     lean = np.abs((angle[:, None] - np.radians(ring.joint_angles) + np.pi) % (2 * np.pi) - np.pi)
-    return (np.abs(lean - half_angle) < distance).any(axis=1)
+    return (np.abs(lean - half_angle) < np.radians(3.5)).any(axis=1)
 
 
 def anchor_place(ring: Ring, bolts: Bolts) -> tuple[float, float]:

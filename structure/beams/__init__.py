@@ -1,0 +1,1 @@
+"""The beam-spring ring: straight beams on the centre line, joints, soil springs at the nodes."""

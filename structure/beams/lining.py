@@ -1,0 +1,87 @@
+"""A ring of beams, joint and soil springs, loaded on its outer face (load-structure model, Xie et al., Eq. 9)."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from structure.banded import folded
+from structure.beams.elements import joint_jumps, section_operators, segment_stiffness, self_weight, traction_operator
+from structure.beams.mesh import RingMesh, displacements_at, forces_at
+from structure.discrete import SIDES, DiscreteLining, Readings
+from structure.lining import THETA
+from structure.ring import Ring, check_ring
+from structure.ring_forces import RingParts, whole_movements
+
+
+class BeamSpringLining(DiscreteLining):
+    """Straight Timoshenko beams on the centre line, zero-thickness joints, soil springs on the outer face.
+
+    Parameters
+    ----------
+    ring : Ring
+
+    Notes
+    -----
+    Forces are taken at the middle of every element, where the chord is parallel to the circle, and are linear between
+    the middles. Displacements on a joint are the mean of its two sides. Soil springs start unstressed at the undeformed
+    ring: the pressures given are what the soil exerts there, and the springs add what the ring's displacement
+    mobilises.
+    """
+
+    name = "beam-spring"
+
+    def __init__(self, ring: Ring):
+        check_ring(ring)
+        self.mesh = RingMesh(ring)
+        super().__init__(ring, _parts(ring, self.mesh), _readings(ring, self.mesh))
+
+    def tractions(self, theta: np.ndarray) -> tuple[sparse.csr_array, sparse.csr_array]:
+        return traction_operator(self.ring, self.mesh, theta)
+
+
+def _parts(ring: Ring, mesh: RingMesh) -> RingParts:
+    size, node = 3 * mesh.n_nodes, np.arange(mesh.n_nodes)
+    nodes = mesh.unknowns(node)[:, :2]
+    whole = whole_movements(size, nodes, mesh.node_angle, 1.0)
+    rigid = whole.copy()
+    rigid[2, 2::3] = 1 / ring.centre_radius
+    invert = int(np.argmin(np.abs(mesh.node_angle % (2 * np.pi) - np.pi)))
+    jumps = joint_jumps(mesh)
+    stiffness = ring.joint_normal_stiffness, ring.joint_shear_stiffness, ring.joint_rotational_stiffness
+    # Tangential springs on the outer face also feel the rotation.
+    on_face = ring.ground is not None and ring.ground.slip_at == "outer_face"
+    lever = np.full(mesh.n_nodes, ring.thickness / 2 if on_face else 0.0)
+    place = (np.concatenate([node, mesh.n_nodes + node, mesh.n_nodes + node]), mesh.unknowns(node).T.ravel())
+    values = np.concatenate([np.ones(2 * mesh.n_nodes), lever])
+    return RingParts(
+        segments=segment_stiffness(ring, mesh),
+        linear_joints=(jumps.T @ sparse.diags_array(np.tile(stiffness, len(mesh.joint_after))) @ jumps).tocsr(),
+        jumps=jumps,
+        feel=sparse.coo_array((values, place), shape=(2 * mesh.n_nodes, size)).tocsr(),
+        area=np.tile(ring.outer_radius * mesh.node_span, 2),
+        weight=self_weight(ring, mesh),
+        place=mesh.unknowns(folded(mesh.n_nodes)).ravel(),
+        held=np.zeros(0, dtype=int) if ring.ground is not None else mesh.unknowns(invert),
+        nodes=nodes,
+        node_angle=mesh.node_angle,
+        rigid=rigid,
+        mean=whole * np.repeat(mesh.node_span / (2 * np.pi), 3),
+        arm=np.tile([1.0, 1.0, ring.centre_radius], mesh.n_nodes),
+    )
+
+
+def _readings(ring: Ring, mesh: RingMesh) -> Readings:
+    theta = np.radians(THETA)
+    at_theta = forces_at(mesh, theta)
+    sides = [displacements_at(mesh, theta + side) for side in SIDES]
+    movement = tuple((one + other) / 2 for one, other in zip(*sides, strict=True))
+    return Readings(
+        forces=tuple((at_theta @ part).tocsr() for part in section_operators(ring, mesh)),
+        movement=movement,
+        quarters=movement[0][:: len(THETA) // 4],
+        spring_angle=mesh.node_angle,
+        lined=np.ones(len(THETA)),
+        near_force=np.zeros(len(THETA), dtype=bool),
+        weight_offset=0.0,
+    )
