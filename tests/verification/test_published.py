@@ -53,9 +53,9 @@ def test_page_answers_the_statements_and_draws_every_figure(rehearsal):
     assert not re.search(r"\{\{\w+\}\}|nan", page)
     for published in ("1185", "-267", "33", "90 270"):
         assert f"| {published} |" in page
-    # 40 kg/m is not far enough for what is said of 1000 kg/m
+    # 40 kg/m is not far enough for what is said of 1000 kg/m, and one inflow mass for no growth
     said = {row["statement"] for row in data["answers"]}
-    assert "largest shear [%]" not in said and len(data["answers"]) == 30
+    assert "largest shear [%]" not in said and len(data["answers"]) == 28
 
 
 @pytest.mark.slow

@@ -114,7 +114,7 @@ def _verdicts(groups, meshes, measure, changed, own):
             statement, found[key], {size: one[key] for size, one in of_mesh.items() if key in one},
             {name: [(a[key], b[key]) for a, b in pairs if key in a and key in b] for name, pairs in changed.items()},
         )
-        for key, statement in statements(*groups).items() if key in found
+        for key, statement in statements(*groups).items() if key in found and np.isfinite(found[key].value)
     }  # fmt: skip
 
 
