@@ -12,7 +12,7 @@ REPORTS = {
     "accuracy.md": ("Accuracy", "gush accuracy"),
     "stability.md": ("Stability", "gush stability"),
     "performance.md": ("Performance", "gush bench"),
-    "study.md": ("Study", "gush study table-2"),
+    "published.md": ("The published study", "gush published"),
 }
 EQUATION = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.DOTALL)
 #: Functions, around which TeX leaves a thin space and MathML from it does not.

@@ -99,9 +99,9 @@ def stability_command(
 def published_command(
     out: Annotated[Path, typer.Option(help="Folder of the runs. What is there is not run again.")] = PUBLISHED_RUNS,
     page: Annotated[
-        Path | None, typer.Option(help="Folder for study.md and its figures; that of the runs when left out.")
+        Path | None, typer.Option(help="Folder for published.md and its figures; that of the runs when left out.")
     ] = None,
-    coarse: Annotated[bool, typer.Option("--coarse", help="A rehearsal on coarse meshes, to 100 kg/m.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="A look in ten minutes: the cases alone, coarse.")] = False,
     page_only: Annotated[bool, typer.Option("--page-only", help="Run nothing: page and figures of what is there.")] = (
         False
     ),
@@ -109,19 +109,19 @@ def published_command(
     scheduler: Annotated[str | None, typer.Option(help="Address of a running dask scheduler to use instead.")] = None,
     json_path: JsonPath = None,
 ):
-    """The published study, whole: Table 2, twin tunnels, mirror image, sensitivity; page and figures. Rerun to resume.
+    """The published study, whole: its cases, other meshes, what it does not state; page and figures. Rerun to resume.
 
     JSON: keys of `verification.published.page.write_page`, and `studies`: keys of `coupling.studies.stored.run_study`.
     """
     with failures(), checked_json(json_path):
         from verification.published.page import write_page
-        from verification.published.run_all import run_all
+        from verification.published.runs import run_all
 
-        studies = [] if page_only else run_all(out, coarse, workers, scheduler, Console(stderr=True))
+        studies = [] if page_only else run_all(out, quick, workers, scheduler, Console(stderr=True))
         data = write_page(out, page if page is not None else out) | {"studies": studies}
-        table = Table("statement", "published", "here", "agrees")
+        table = Table("statement", "published", "ours", "agrees")
         for row in data["answers"]:
-            verdict = {True: "yes", False: "[red]no[/red]", None: ""}[row["agrees"]]
+            verdict = "[red]no[/red]" if row["agrees"] == "no" else row["agrees"]
             table.add_row(*(row[name].replace("[", "\\[") for name in ("statement", "published", "ours")), verdict)
         missing = [f"not finished: {', '.join(data['missing'])}"] if data["missing"] else []
         _show(json_path, data, [table], [*missing, f"page: {data['page']}"])
@@ -130,7 +130,7 @@ def published_command(
 
 
 def figures_command(
-    study: Annotated[Path, typer.Argument(help="Folder of a study with published cases, e.g. studies/table-2.")],
+    study: Annotated[Path, typer.Argument(help="Folder of a study with published cases, as published/cases.")],
     out: Annotated[Path | None, typer.Option(help="Folder of the figures; STUDY/figures when left out.")] = None,
     json_path: JsonPath = None,
 ):

@@ -8,17 +8,17 @@ import xarray as xr
 from running import gush
 
 import coupling
-from coupling.postprocess import with_inflow
 from structure.theory import theoretical_pressures
-from verification.published.answers import twin_answers
-from verification.published.evidence import RunEvidence, initial_theory, mirror_difference
+from verification.published.bands import judged
+from verification.published.evidence import at_rest, initial_theory
+from verification.published.linings import one_layer
 from verification.published.page import write_page
-from verification.published.run_all import plans
-from verification.published.sensitivity_figure import changes, sensitivity_figure
-from verification.published.sources import at_study_inflow, published_numbers
+from verification.published.rates import CONTRACTION, independent_rates
+from verification.published.runs import COARSE as COARSER
+from verification.published.runs import SOURCE_MESH, plans
+from verification.published.statements import Found, Statement, measured_trough, statements
+from verification.published.unknowns import changed_rings
 from verification.small_event import COARSE
-
-pytestmark = pytest.mark.slow
 
 FIXED = {f"discretisation.{name}": value for name, value in COARSE.items()} | {
     "numerics.relaxation_tolerance": 1e-3,
@@ -31,48 +31,76 @@ FIXED = {f"discretisation.{name}": value for name, value in COARSE.items()} | {
 
 @pytest.fixture(scope="module")
 def rehearsal(tmp_path_factory):
-    """Case 3, case 9 and the twin tunnels, a hundred times too coarse, and the page of them."""
+    """Case 3, case 9, the twin tunnels and one unknown, a hundred times too coarse, and the page of them."""
     folder = tmp_path_factory.mktemp("published")
-    for name, scenes in (("table-2", ["case-3", "case-9"]), ("twin-and-mirror", ["twin-tunnels"])):
-        plan = {"name": name, "design": "list", "records": 5, "fixed": FIXED, "parameters": {"scene": scenes}}
-        study = coupling.study(plan, folder / name, workers=0)
-        assert study["status"].values.tolist() == ["finished"] * len(scenes), study["message"].values
+    scenes = {"design": "list", "parameters": {"scene": ["case-3", "case-9", "twin-tunnels"]}}
+    changes = {"design": "one-at-a-time", "scene": "case-3", "parameters": {"soils.0.dilatancy_angle": [5.0]}}
+    for name, plan in (("cases", scenes), ("unknowns", changes)):
+        study = coupling.study({"name": name, "records": 5, "fixed": FIXED, **plan}, folder / name, workers=0)
+        assert set(study["status"].values) == {"finished"}, study["message"].values
     return folder, write_page(folder, folder)
 
 
-def test_page_answers_every_statement_and_draws_every_figure(rehearsal):
+@pytest.mark.slow
+def test_page_answers_the_statements_and_draws_every_figure(rehearsal):
     folder, data = rehearsal
-    page = (folder / "study.md").read_text(encoding="utf-8")
-    numbers = "06 07 09 10 11 12 13 14 15 15-ring 16 17 19 20 21 22 23".split()
+    page = (folder / "published.md").read_text(encoding="utf-8")
+    numbers = "06 07 09 10 11 12 13 14 15 15-ring 16 17 19 20 21 22 22-displacement 23 bands".split()
     assert sorted(data["figures"]) == numbers
     for path in re.findall(r"\]\((images/\S+)\)", page):
         assert (folder / path).stat().st_size > 10_000
-    assert data["missing"] == ["case 3 mirrored", "sensitivity"]
-    for published in ("1185", "-267", "+114", "+82", "+75", "2 and 3", "about 3", "about 1"):
+    assert data["missing"] == [f"case {k}" for k in (1, 2, 4, 5, 6, 7, 8, 10)] + ["meshes", "twin-unknowns"]
+    assert not re.search(r"\{\{\w+\}\}|nan", page)
+    for published in ("1185", "-267", "33", "90 270"):
         assert f"| {published} |" in page
-    assert "not run" not in page and "| case-9 | 90° | 5 m | sand | beam-spring |" in page
-    assert all(row["agrees"] in (True, False, None) for row in data["answers"])
+    # 40 kg/m is not far enough for what is said of 1000 kg/m, and one inflow mass for no growth
+    said = {row["statement"] for row in data["answers"]}
+    assert "largest shear [%]" not in said and len(data["answers"]) == 28
 
 
+@pytest.mark.slow
 def test_numbers_on_the_page_are_those_of_the_datasets(rehearsal):
-    folder, data = rehearsal
-    study = coupling.read_study(folder / "table-2")
-    moment = study["joint_bending_moment"].isel(case=0, progress=0, model=0).values / 1e3
+    _, data = rehearsal
+    scene = coupling.load_scene("case-3")
     ours = {row["statement"]: row["ours"] for row in data["answers"]}
-    assert ours["initial M, joint 2 [kN m/m]"] == f"{moment[1]:.0f}"
-    largest = study["bending_moment"].isel(case=0, model=0).max("theta")
-    change = 100 * float(largest.interp(progress=0.5) / largest.isel(progress=0)) - 100
-    # the page takes the state of the run, the study that between two of its five: equal at half of the last inflow
-    assert float(re.match(r"[+-]\d+", ours["largest positive moment [%]"])[0]) == pytest.approx(change, abs=1.0)
+    # initial moments are of the bonded state: within the coarse mesh's error of theory loads, not of the slipped record
+    theory = coupling.responses.respond.respond(scene, initial_theory(scene, scene.tunnels[0]).assign(
+        soil_shear=theoretical_shear(scene)).expand_dims(time=[0.0]))  # fmt: skip
+    expected = theory["joint_bending_moment"].values[0, 1] / 1e3
+    assert float(ours["initial M, joint 2 [kN m/m]"]) == pytest.approx(expected, rel=0.1)
 
 
+def theoretical_shear(scene):
+    """Shear of the undisturbed ground on the circle (theta) [Pa]."""
+    soil = scene.soils[0]
+    buoyant = scene.gravity * (1 - soil.porosity) * (soil.grain_density - scene.water.density)
+    loads = theoretical_pressures(
+        outer_diameter=6.6, cover=20.0, buoyant_unit_weight=buoyant, coefficient_at_rest=3 / 7
+    )
+    theta = initial_theory(scene, scene.tunnels[0])["theta"]
+    return loads["soil_shear"].isel(time=0, drop=True).interp(theta=theta)
+
+
+@pytest.mark.slow
 def test_figures_command_draws_a_study(rehearsal, tmp_path):
     folder, _ = rehearsal
-    result = gush("figures", folder / "twin-and-mirror", "--out", tmp_path / "figures")
+    result = gush("figures", folder / "unknowns", "--out", tmp_path / "figures")
     assert result.exit_code == 0, result.output
-    assert {path.name for path in (tmp_path / "figures").iterdir()} == {"figure-06.png", "figure-07.png"}
+    assert {"figure-09.png", "figure-15.png"} <= {path.name for path in (tmp_path / "figures").iterdir()}
     result = gush("figures", tmp_path)
     assert result.exit_code == 2 and "run gush study first" in result.output
+
+
+@pytest.mark.slow
+def test_bonded_ground_at_rest_has_the_theoretical_pressures(tmp_path):
+    scene = coupling.load_scene("case-3", **FIXED)
+    first = at_rest(scene, tmp_path / "rest.nc").isel(time=0)
+    again = at_rest(scene, tmp_path / "rest.nc").isel(time=0)
+    theory = initial_theory(scene, scene.tunnels[0])
+    # K0 and hydrostatic stress are in equilibrium on any mesh; a polygon of this size has its faces 2 % off the circle
+    for name in ("soil_pressure", "water_pressure"):
+        np.testing.assert_allclose(first[name], theory[name], rtol=0.05)
+        np.testing.assert_array_equal(first[name], again[name])
 
 
 def test_theory_of_the_initial_pressures_is_that_of_the_ring():
@@ -87,91 +115,99 @@ def test_theory_of_the_initial_pressures_is_that_of_the_ring():
         np.testing.assert_allclose(ours[name], theirs[name].interp(theta=ours["theta"]), rtol=1e-9)
 
 
-def test_mirror_images_differ_by_nothing_and_others_do():
-    theta, time = np.arange(360.0), np.array([0.0, 1.0])
-    field = (1 + time)[:, None] * (2 + np.sin(np.radians(theta)) + 0.3 * np.cos(np.radians(3 * theta)))
-    image = (1 + time)[:, None] * (2 - np.sin(np.radians(theta)) + 0.3 * np.cos(np.radians(3 * theta)))
-
-    def run(values):
-        return xr.Dataset(
-            {"soil_pressure": (("time", "theta"), values), "water_pressure": (("time", "theta"), values),
-             "inflow_mass": ("time", 100 * time)}, coords={"time": time, "theta": theta},
-        )  # fmt: skip
-
-    found = mirror_difference(run(field), run(image), 50.0)
-    assert max(map(abs, found.values())) < 1e-12
-    assert mirror_difference(run(field), run(field), 50.0)["soil_pressure"] > 0.3
+def test_there_are_43_statements_with_a_verdict_and_the_published_numbers_meet_their_own_rules():
+    stated = statements("initial", "gushing", "twin")
+    rules = [one for one in stated.values() if one.accepted is not None]
+    assert len(rules) == 43 and len(stated) == 49
+    assert all(one.accepted[0] <= one.stated[0] and one.stated[1] <= one.accepted[1] for one in rules)
 
 
-def twin(widths):
-    """Evidence of twin tunnels whose troughs have these widths at four inflow masses and grow."""
-    x, time = np.arange(-39.5, 40.0), np.arange(5.0)
+TENTH = Statement("a number", "100", (100.0, 100.0), "within 10", "{:.0f}", (90.0, 110.0))
+
+
+@pytest.mark.parametrize(
+    ("ours", "changed", "verdict"),
+    [(95.0, 95.0, "yes"), (150.0, 149.0, "no"), (150.0, 99.0, "in the band"), (150.0, 210.0, "no")],
+)
+def test_a_statement_agrees_as_run_or_in_the_band_of_what_is_not_stated(ours, changed, verdict):
+    found = judged(TENTH, Found(ours), {}, {"permeability": [(Found(changed), Found(ours))]})
+    assert found.agrees == verdict
+
+
+def test_shares_and_mesh_error_add_in_quadrature_to_their_side():
+    found = judged(
+        TENTH, Found(50.0), {1.0: Found(50.0), 2.0: Found(53.0)},
+        {"one": [(Found(14.0), Found(10.0)), (Found(12.0), Found(10.0))], "other": [(Found(-2.0), Found(10.0))]},
+    )  # fmt: skip
+    assert (found.mesh, found.low, found.high) == pytest.approx((3.0, 50 - np.hypot(12, 3), 50 + np.hypot(4, 3)))
+    assert found.shares == {"other": (-12.0, 0.0), "one": (0.0, 4.0)}
+
+
+def test_factors_multiply():
+    rate = TENTH._replace(factor=True)
+    tenth, same = (Found(5.0), Found(50.0)), (Found(50.0), Found(50.0))
+    found = judged(rate, Found(1000.0), {}, {"one": [tenth], "nothing": [same]})
+    assert (found.low, found.high) == pytest.approx((100.0, 1000.0)) and found.agrees == "in the band"
+
+
+def test_rings_that_the_source_allows_differ_in_what_it_does_not_state_and_stay_symmetric():
+    ring = coupling.load_scene("case-3").ring
+    rings = changed_rings(ring)
+    assert len(rings["joint angles"]) == len(ring.joint_angles)
+    for other in rings["joint angles"]:
+        angles = np.array(other.joint_angles)
+        np.testing.assert_allclose(angles + angles[::-1], 360.0)
+        assert np.abs(angles - ring.joint_angles).max() == pytest.approx(3.0)
+    assert rings["uplift of the ring"][0].balance_uplift is not ring.balance_uplift
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.2])
+def test_one_layer_of_linear_triangles_is_three_times_as_stiff_and_more_the_longer_they_are(nu):
+    # short ones: constant strain of +-h/2 instead of the linear one, h^2/4 over h^2/12; and both triangles of a pair
+    # have the same strain across, so that the layer cannot thin where it stretches; thickness over radius leaves 2 %
+    fine = one_layer(0.005, 3.3, 3.25, nu)
+    assert fine == pytest.approx(3.0 * (1 - nu) ** 2 / (1 - 2 * nu), rel=0.02)
+    # slender triangles shear where they should bend: a share that grows with (length / thickness)^2
+    two, four = (one_layer(size, 3.3, 2.95, 0.2) - one_layer(0.02, 3.3, 2.95, 0.2) for size in (0.35, 0.7))
+    assert four / two == pytest.approx(4.0, rel=0.15)
+
+
+def test_rates_of_simpler_theories():
+    scene = coupling.load_scene("case-3")
+    rates = independent_rates(scene)
+    # Torricelli at the axis, 23.3 m below the table
+    assert rates["water"] == pytest.approx(1000 * CONTRACTION * 0.2 * np.sqrt(2 * 9.81 * 23.3))
+    wide = scene.model_copy(update={"gate": scene.gate.model_copy(update={"width": 0.4})})
+    assert independent_rates(wide)["dry hopper"] == pytest.approx(2**1.5 * rates["dry hopper"])
+
+
+def trough(widths):
+    """Verdicts on troughs of these widths at 500, 1000, .. kg/m, each deeper than the last."""
+    x, time = np.arange(-39.5, 40.0), np.arange(len(widths) + 1.0)
     rows = [0 * x] + [0.01 * k * np.exp(-(x**2) / (2 * w**2)) for k, w in enumerate(widths, start=1)]
-    settlement = xr.DataArray(np.array(rows), dims=("time", "x"), coords={"time": time, "x": x}, name="settlement")
-    history = xr.Dataset({"inflow_mass": ("time", 500 * time)}, coords={"time": time})
-    theory = xr.Dataset({name: ("theta", np.full(8, 1e5)) for name in ("soil_pressure", "water_pressure")})
-    pressures = xr.concat([theory, 1.04 * theory], dim="tunnel").expand_dims("time")
-    nothing = dict.fromkeys(("scene", "history", "points", "mesh", "horizontal", "vertical"))
-    return RunEvidence(
-        masses=(500.0, 1000.0, 1500.0, 2000.0), pressures=pressures, responses={}, theory=[theory, theory],
-        settlement=with_inflow(settlement.to_dataset(), history), **nothing,
-    )  # fmt: skip
+    settlement = xr.Dataset(
+        {"settlement": (("time", "x"), np.array(rows))}, {"time": time, "x": x, "inflow_mass": ("time", 500 * time)}
+    )
+    found = measured_trough(settlement, 500 * time[1:])
+    stated = statements("twin")
+    return {key: judged(stated[key], value, {}, {}).agrees for key, value in found.items()}
 
 
-def test_rules_on_the_twin_tunnels_pass_and_fail():
-    narrow = [answer.agrees for answer in twin_answers(twin([8.0, 8.1, 8.2, 8.3]))]
-    # 4 % off theory: soil within 5 %, water not within 2 %; all the rest as published
-    assert narrow == [True, False, True, True, True]
-    wide = [answer.agrees for answer in twin_answers(twin([8.0, 12.0, 16.0, 20.0]))]
-    assert wide[-2:] == [False, False]
+def test_rules_on_the_trough_pass_and_fail():
+    assert trough([8.0, 8.1, 8.2, 8.3]) == {"grows": "yes", "width": "yes", "within": "yes"}
+    assert trough([8.0, 12.0, 16.0, 20.0]) == {"grows": "yes", "width": "no", "within": "no"}
 
 
-def sensitivity_data():
-    """A study of three cases: as it is, half the permeability and half the rate, one that failed."""
-    import json
+def test_studies_are_valid_and_a_look_is_coarse():
+    from coupling.studies.design import cases, load_study
 
-    mass, progress = np.linspace(0.0, 100.0, 11), np.linspace(0.0, 1.0, 11)
-    time = np.stack([mass / 50, mass / 25, np.nan * mass])
-    theta, joint = np.arange(0.0, 360.0, 90.0), np.arange(1, 7)
-    ones = np.ones((3, 11))[..., None]
-    forces = {name: (("case", "progress", "model", "theta"), ones[..., None] * np.ones(4) * 1e3)
-              for name in ("axial_force", "shear_force", "bending_moment")}  # fmt: skip
-    return xr.Dataset(
-        {
-            "time": (("case", "progress"), time),
-            "soil_pressure": (("case", "progress", "theta"), ones * np.ones(4) * 1e3),
-            "joint_rotation": (("case", "progress", "model", "joint"), ones[..., None] * np.ones(6)),
-            "status": ("case", ["finished", "finished", "failed"]),
-            **forces,
-        },
-        coords={
-            "case": [0, 1, 2], "progress": progress, "inflow_mass": (("case", "progress"), np.tile(mass, (3, 1))),
-            "theta": theta, "joint": joint, "model": ["beam-spring"],
-            "soils_0_k": ("case", [2.0, 1.0, 0.5]),
-        },
-        attrs={"study": json.dumps({"parameters": {"soils.0.k": [1.0, 0.5]}})},
-    )  # fmt: skip
-
-
-def test_sensitivity_compares_at_equal_inflow_and_leaves_failures_out():
-    table = changes(sensitivity_data())
-    assert [row["change"] for row in table["rows"]] == ["as it is", "soils.0.k = 1"]
-    assert [row["inflow rate"] for row in table["rows"]] == pytest.approx([50.0, 25.0])
-    assert table["inflow_mass"] == 100.0 and len(sensitivity_figure(table).axes) == len(table["units"])
-
-
-def test_study_at_an_inflow_mass_is_unknown_beyond_what_was_run():
-    data = sensitivity_data()
-    assert at_study_inflow(data, 45.0)["time"].values[:2] == pytest.approx([0.9, 1.8])
-    assert np.isnan(at_study_inflow(data, 101.0)["time"]).all()
-
-
-def test_full_study_has_the_published_stops_and_a_rehearsal_is_coarse():
-    from coupling.studies.cases import cases
-
-    full, rehearsed = plans(), plans(coarse=True)
-    assert len(cases(full[0])) == 10 and full[0].backends == ("beam-spring", "continuum")
-    end = published_numbers()["gushing"]["end_inflow_mass"]
-    assert {case.scene.stop.inflow_mass for plan in full[:2] for case in cases(plan)} == {end}
-    sizes = {case.scene.discretisation.element_size for plan in rehearsed for case in cases(plan)}
-    assert sizes == {coupling.load_scene("quick").discretisation.element_size}
+    studies = {plan["name"]: cases(load_study(plan)) for plan in plans()}
+    assert [len(found) for found in studies.values()] == [11, 4, 17, 4]
+    for case in studies["cases"]:
+        assert case.scene.discretisation == coupling.load_scene(case.scene.name).discretisation
+    # unknowns are varied from case 3
+    first = studies["unknowns"][0]
+    assert first.changes == {} and first.scene.soils == studies["cases"][0].scene.soils
+    size = coupling.load_scene("case-3").discretisation.element_size
+    look = [case.scene.discretisation.element_size for plan in plans(quick=True) for case in cases(load_study(plan))]
+    assert min(size for size in look if size != SOURCE_MESH["element_size"]) == COARSER * size

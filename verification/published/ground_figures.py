@@ -1,17 +1,21 @@
-"""Figures 6, 9, 11 and 12 of the published study: settlement, inflow and flow zone, stresses in the ground."""
+"""Figures 6 and 9 to 12 of the published study: settlement, inflow and flow zone, fields and stresses in the ground."""
 
 from __future__ import annotations
 
 import matplotlib
 import numpy as np
-from matplotlib.colors import TwoSlopeNorm
+from matplotlib.colors import LogNorm, Normalize, TwoSlopeNorm
+from matplotlib.tri import Triangulation
 
 from coupling import postprocess
 from coupling.datasets.geometry import tunnel_of
 from coupling.figures import GATE, INITIAL, NOW, SECOND, STYLE
-from coupling.figures.ground import frame_view
+from coupling.figures.ground import FIELD_COLOURS, frame_view
 from coupling.figures.picture import Picture
 from coupling.figures.tunnel import draw_linings
+
+#: Displacements that bound the flow zone and the disturbed zone [mm].
+ZONES = (50.0, 10.0)
 
 
 def mass_colours(count):
@@ -20,15 +24,7 @@ def mass_colours(count):
 
 
 def settlement_troughs(settlement, masses):
-    """Settlement of the ground surface at some inflow masses, with the width of each trough.
-
-    Parameters
-    ----------
-    settlement : xarray.Dataset
-        settlement (time, x) [m] and inflow_mass (time) [kg/m].
-    masses : sequence of float
-        [kg/m]
-    """
+    """Settlement of the ground surface (time, x) at some inflow masses [kg/m], with the width of each trough."""
     with matplotlib.rc_context(STYLE):
         figure = Picture(figsize=(5.6, 3.2), layout="constrained")
         axis = figure.subplots()
@@ -45,24 +41,18 @@ def settlement_troughs(settlement, masses):
     return figure
 
 
-def inflow_and_stages(history, stages):
-    """Inflow mass and areas of both zones over time, with the three stages of the flow zone.
-
-    Parameters
-    ----------
-    history : xarray.Dataset
-    stages : coupling.postprocess.Stages
-        Over time.
-    """
-    time = history["time"].values
+def inflow_and_stages(history):
+    """Inflow mass and areas of both zones over time, with the three stages of the flow zone."""
+    stages, time = postprocess.flow_zone_stages(history), history["time"].values
     nodes = [float(time[0]), *stages.bends, float(time[-1])]
     with matplotlib.rc_context(STYLE):
         figure = Picture(figsize=(5.2, 4.6), layout="constrained")
         upper, lower = figure.subplots(2, 1, sharex=True)
         upper.plot(time, history["inflow_mass"], color=NOW)
         upper.set_ylabel("inflow mass [kg/m]")
-        lower.plot(time, history["flow_zone_area"], color=GATE, label="flow zone (> 50 mm)")
-        lower.plot(time, history["disturbed_area"], color=SECOND, ls="--", label="disturbed (10 to 50 mm)")
+        lower.plot(time, history["flow_zone_area"], color=GATE, label=f"flow zone (> {ZONES[0]:g} mm)")
+        disturbed = f"disturbed ({ZONES[1]:g} to {ZONES[0]:g} mm)"
+        lower.plot(time, history["disturbed_area"], color=SECOND, ls="--", label=disturbed)
         lower.plot(nodes, stages.areas, "o-", color="0.2", lw=0.8, ms=3, label="three straight pieces")
         lower.set_ylabel("area [m²]")
         lower.set_xlabel("time since the gate opened [s]")
@@ -81,6 +71,83 @@ def inflow_and_stages(history, stages):
             )  # fmt: skip
         figure.align_ylabels()
     return figure
+
+
+def fields_around(fields, mesh, mass):
+    """Displacement with the edges of both zones, deviatoric strain, pore pressure, vertical stress at an inflow mass.
+
+    Parameters
+    ----------
+    fields : xarray.Dataset
+        Of :func:`coupling.postprocess.element_fields`, with inflow_mass (time).
+    mesh : xarray.Dataset
+    mass : float
+        [kg/m]
+    """
+    now = postprocess.at_inflow(fields, mass)
+    panels = (
+        ("displacement [mm]", 1e3 * now["displacement"].values, LogNorm(1.0, 1000.0), "both"),
+        ("deviatoric strain [-]", now["deviatoric_strain"].values, LogNorm(1e-3, 1.0), "both"),
+        ("pore pressure [kPa]", now["pore_pressure"].values / 1e3, Normalize(0.0, 400.0), "max"),
+        ("vertical effective stress [kPa]", now["soil_stress_vertical"].values / 1e3, Normalize(0.0, 300.0), "max"),
+    )
+    with matplotlib.rc_context(STYLE):
+        figure = Picture(figsize=(7.2, 6.4), layout="constrained")
+        axes = figure.subplots(2, 2, sharex=True, sharey=True)
+        for axis, (title, values, norm, extend), colours in zip(axes.flat, panels, FIELD_COLOURS, strict=True):
+            drawn, triangles, nodal = _draw_field(axis, mesh, values, colours, norm)
+            if title.startswith("displacement"):
+                lines = axis.tricontour(triangles, nodal, levels=sorted(ZONES), colors=[SECOND, GATE], linewidths=1.0)
+                axis.clabel(lines, fmt="%g mm", fontsize=6.5)
+            bar = figure.colorbar(drawn, ax=axis, shrink=0.92, extend=extend, pad=0.02)
+            bar.outline.set_linewidth(0.5)
+            axis.set_title(title)
+        _label(axes)
+        figure.suptitle(f"{mass:.0f} kg/m", fontsize=9)
+    return figure
+
+
+def stress_variation_fields(fields, mesh, masses, name="soil_stress_vertical"):
+    """R_sigma (Eq. 10) of a stress around the tunnel at some inflow masses [kg/m]; as :func:`fields_around`."""
+    initial = fields[name].isel(time=0, drop=True)
+    with matplotlib.rc_context(STYLE):
+        figure = Picture(figsize=(3.4 * len(masses) + 0.6, 3.5), layout="constrained")
+        axes = np.atleast_2d(figure.subplots(1, len(masses), sharey=True))
+        for axis, mass in zip(axes[0], masses, strict=True):
+            now = postprocess.at_inflow(fields[[name, "inflow_mass"]], mass)[name]
+            ratio = postprocess.stress_variation(now, initial).values
+            drawn, *_ = _draw_field(axis, mesh, ratio, "RdBu_r", TwoSlopeNorm(0.0, -1.0, 1.0))
+            axis.set_title(f"{mass:.0f} kg/m")
+        _label(axes)
+        bar = figure.colorbar(drawn, ax=list(axes[0]), extend="max", shrink=0.9, pad=0.02)
+        bar.set_label(f"R$_\\sigma$ of the {fields[name].attrs['long_name'].partition(',')[0]} [-]")
+        bar.outline.set_linewidth(0.5)
+    return figure
+
+
+def _label(axes):
+    for axis in axes[-1]:
+        axis.set_xlabel("x [m]")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("y [m]")
+
+
+def _draw_field(axis, mesh, values, colours, norm):
+    """The ground's element means, projected on its nodes, with linings and gate; triangles and nodal values too."""
+    x0, y0, radius, _ = tunnel_of(mesh)
+    nodes, count = mesh["element_nodes"].values, mesh.sizes["node"]
+    shown = (mesh["region"].values == 0) & np.isfinite(values)
+    area = postprocess.element_areas(mesh)[shown]
+    corners = nodes[shown]
+    total = sum(np.bincount(corners[:, k], area, count) for k in range(3))
+    summed = sum(np.bincount(corners[:, k], area * values[shown], count) for k in range(3))
+    nodal = np.where(total > 0, summed / np.where(total > 0, total, 1.0), 0.0)
+    triangles = Triangulation(mesh["x"].values, mesh["y"].values, corners)
+    clipped = np.clip(nodal, norm.vmin, None) if isinstance(norm, LogNorm) else nodal
+    drawn = axis.tripcolor(triangles, clipped, cmap=colours, norm=norm, shading="gouraud", rasterized=True)
+    draw_linings(axis, mesh, zorder=3)
+    frame_view(axis, x0, y0, 3.5 * radius)
+    return drawn, triangles, nodal
 
 
 def stresses_along_axes(horizontal, vertical, masses):
@@ -119,45 +186,4 @@ def stresses_along_axes(horizontal, vertical, masses):
             axis.set_xlabel(f"{data.attrs['direction']} distance from the gate over D")
             axis.grid(True)
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=len(masses) + 1)
-    return figure
-
-
-def stress_variation_fields(fields, mesh, masses, name="soil_stress_vertical"):
-    """R_sigma (Eq. 10) around the tunnel at some inflow masses.
-
-    Parameters
-    ----------
-    fields : xarray.Dataset
-        Of :func:`coupling.postprocess.element_fields`, with inflow_mass (time).
-    mesh : xarray.Dataset
-    masses : sequence of float
-        [kg/m]
-    name : str
-        Stress that varies.
-    """
-    x0, y0, radius, _ = tunnel_of(mesh)
-    half = 4.0 * radius
-    corners = mesh["element_nodes"].values
-    ground = (mesh["region"] == 0).values
-    initial = fields[name].isel(time=0, drop=True)
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(3.4 * len(masses) + 0.6, 3.5), layout="constrained")
-        axes = np.atleast_1d(figure.subplots(1, len(masses), sharey=True))
-        for axis, mass in zip(axes, masses, strict=True):
-            now = postprocess.at_inflow(fields[[name, "inflow_mass"]], mass)[name]
-            ratio = postprocess.stress_variation(now, initial).values
-            shown = ground & np.isfinite(ratio)
-            drawn = axis.tripcolor(
-                mesh["x"].values, mesh["y"].values, corners[shown], facecolors=ratio[shown], cmap="RdBu_r",
-                norm=TwoSlopeNorm(0.0, -1.0, 1.0), rasterized=True,
-            )  # fmt: skip
-            draw_linings(axis, mesh, zorder=3)
-            frame_view(axis, x0, y0, half)
-            axis.set_title(f"{mass:.0f} kg/m")
-            axis.set_xlabel("x [m]")
-        axes[0].set_ylabel("y [m]")
-        bar = figure.colorbar(drawn, ax=list(axes), extend="max", shrink=0.9, pad=0.02)
-        about = fields[name].attrs["long_name"].partition(",")[0]
-        bar.set_label(f"R$_\\sigma$ of the {about} [-]")
-        bar.outline.set_linewidth(0.5)
     return figure

@@ -7,10 +7,9 @@ import numpy as np
 
 from coupling import postprocess
 from coupling.datasets.geometry import gate_of
-from coupling.figures import INITIAL, NOW, STYLE
+from coupling.figures import GATE, INITIAL, NOW, STYLE
 from coupling.figures.picture import Picture
-from coupling.figures.polar import around_zero, closed_curve, crown_up, legend_below, radial_ticks
-from coupling.figures.tunnel import mark_gate
+from coupling.figures.polar import around_zero, closed_curve, crown_up, radial_ticks
 from structure.response import FORCES, SHOWN
 from verification.published.ground_figures import mass_colours
 
@@ -20,16 +19,68 @@ JOINTS = {
 }
 
 
-def initial_pressures(pressures, theory):
-    """Initial soil and water pressure on every tunnel's lining against the theoretical ones.
+def rings(panels, columns, gate=None, joints=(), heads=()):
+    """Polar diagrams beside and below each other, the crown up.
 
     Parameters
     ----------
-    pressures : xarray.Dataset
-        `/lining` of a run, the initial state first.
-    theory : sequence of xarray.Dataset
-        soil_pressure, water_pressure (theta) [Pa], one a tunnel.
+    panels : list of (title, curves)
+        Curves: list of (label, (n,) values at whole degrees, keys of a line).
+    columns : int
+        Panels beside each other; every column has the legend of its lowest panel below it, or all the same one.
+    gate : float, optional
+        Angle of a red mark on the rim [degree].
+    joints : sequence of float
+        Angles of grey marks [degree].
+    heads : sequence of str
+        Titles of the columns; those of the panels then stand beside the rows.
     """
+    count = -(-len(panels) // columns)
+    with matplotlib.rc_context(STYLE):
+        height = (2.4 if heads else 3.0) * count + 1.1 * bool(heads)
+        figure = Picture(figsize=(7.4, height), layout=None if heads else "constrained")
+        if heads:  # legends below columns are more than the constrained layout finds room for
+            figure.subplots_adjust(0.1, 0.8 / height, 0.98, 1 - 0.4 / height, wspace=0.45, hspace=0.3)
+        axes = figure.subplots(count, columns, subplot_kw={"projection": "polar"}, squeeze=False)
+        for axis, (title, curves) in zip(axes.flat, panels, strict=True):
+            crown_up(axis)
+            for label, values, style in curves:
+                axis.plot(*closed_curve(np.radians(np.arange(len(values))), values), label=label, **style)
+            around_zero(axis, *(values[np.isfinite(values)] for _, values, _ in curves))
+            if axis.get_ylim()[0] < 0:
+                axis.plot(*closed_curve(np.radians(np.arange(360)), np.zeros(360)), color="0.2", lw=0.8)
+            radial_ticks(axis, None, 4)
+            rim = axis.get_ylim()[1]
+            axis.plot(np.radians(joints), np.full(len(joints), rim), "s", color="0.5", ms=3, clip_on=False, zorder=5)
+            if gate is not None:
+                axis.plot(np.radians(gate), rim, "v", color=GATE, ms=6, clip_on=False, zorder=6)
+            if heads:
+                axis.set_ylabel(title if axis in axes[:, 0] else "", labelpad=28)
+            else:
+                axis.set_title(title, pad=12)
+        for axis, head in zip(axes[0], heads, strict=False):
+            axis.set_title(head, pad=12)
+        below = axes[-1] if heads else axes[-1][:1]
+        for axis in below:
+            handles, labels = axis.get_legend_handles_labels()
+            if heads:
+                below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.12), "ncols": 2}
+                axis.legend(handles, labels, fontsize=6.5, **below)
+            else:
+                figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+    return figure
+
+
+def _states(dataset, masses):
+    """Initial state and those at some inflow masses: (label, dataset, keys of a line)."""
+    states = [("initial", dataset.isel(time=0), {"color": INITIAL, "ls": (0, (4, 2)), "lw": 1.1})]
+    colours = mass_colours(len(masses))
+    return states + [(f"{m:.0f} kg/m", postprocess.at_inflow(dataset, m), {"color": c})
+                     for m, c in zip(masses, colours, strict=True)]  # fmt: skip
+
+
+def initial_pressures(pressures, theory):
+    """Initial soil and water pressure on every tunnel's lining (theta) against the theoretical ones, one a tunnel."""
     first = pressures.isel(time=0)
     tunnels = [first] if "tunnel" not in first.dims else [first.isel(tunnel=k) for k in range(first.sizes["tunnel"])]
     with matplotlib.rc_context(STYLE):
@@ -44,125 +95,75 @@ def initial_pressures(pressures, theory):
             axis.set_xlim(0, 360)
             axis.set_ylim(bottom=0)
             axis.grid(True)
-            if len(tunnels) > 1:
-                axis.set_title(f"tunnel {k}")
+            axis.set_title(f"tunnel {k}" if len(tunnels) > 1 else "")
         axes[0].set_ylabel("pressure [kPa]")
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
 
 
-def pressures_by_inflow(pressures, masses):
-    """Soil and water pressure around the lining, initial and at some inflow masses.
-
-    Parameters
-    ----------
-    pressures : xarray.Dataset
-        One tunnel.
-    masses : sequence of float
-        [kg/m]
-    """
-    states = [("initial", pressures.isel(time=0))]
-    states += [(f"{mass:.0f} kg/m", postprocess.at_inflow(pressures, mass)) for mass in masses]
-    panels = {name: (f"{title} [kPa]", [state[name] / 1e3 for _, state in states]) for name, title in PRESSURES.items()}
-    return _rings(pressures, panels, [label for label, _ in states])
+def pressures_by_inflow(pressures, masses, joints=()):
+    """Soil and water pressure around the lining, initial and at some inflow masses [kg/m]."""
+    states = _states(pressures, masses)
+    panels = [
+        (f"{title} [kPa]", [(label, state[name].values / 1e3, style) for label, state, style in states])
+        for name, title in PRESSURES.items()
+    ]
+    return rings(panels, 2, gate_of(pressures).angle, joints)
 
 
-def pressure_ratios_by_inflow(pressures, masses):
+def pressure_ratios_by_inflow(pressures, masses, joints=()):
     """Soil and water pressure over the initial one at some inflow masses; as :func:`pressures_by_inflow`."""
-    panels = {}
-    for name, title in PRESSURES.items():
-        initial = pressures[name].isel(time=0)
-        ratios = [postprocess.pressure_ratio(pressures, name, mass) for mass in masses]
-        panels[name] = (f"{title} over the initial one [-]", [initial / initial, *ratios])
-    return _rings(pressures, panels, ["initial", *(f"{mass:.0f} kg/m" for mass in masses)])
+    states = _states(pressures, masses)
+    panels = [
+        (f"{title} over the initial one [-]",
+         [(label, state[name].values / states[0][1][name].values, style) for label, state, style in states])
+        for name, title in PRESSURES.items()
+    ]  # fmt: skip
+    return rings(panels, 2, gate_of(pressures).angle, joints)
 
 
-def _rings(pressures, panels, labels):
-    angle = np.radians(pressures["theta"].values)
-    colours = [INITIAL, *mass_colours(len(labels) - 1)]
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(7.2, 4.0), layout="constrained")
-        axes = figure.subplots(1, 2, subplot_kw={"projection": "polar"})
-        for axis, (title, rows) in zip(axes, panels.values(), strict=True):
-            crown_up(axis)
-            for k, (label, row) in enumerate(zip(labels, rows, strict=True)):
-                dashes = {"ls": (0, (4, 2)), "lw": 1.1} if k == 0 else {}
-                axis.plot(*closed_curve(angle, row.values), color=colours[k], label=label, **dashes)
-            axis.set_ylim(0, 1.05 * max(float(row.max()) for row in rows))
-            radial_ticks(axis, gate_of(pressures))
-            mark_gate(axis, pressures)
-            axis.set_title(title, pad=12)
-        legend_below(figure, axes[0])
-    return figure
-
-
-def forces_by_inflow(response, masses):
-    """N, Q and M around the ring, initial and at some inflow masses.
-
-    Parameters
-    ----------
-    response : xarray.Dataset
-        With inflow_mass (time) [kg/m].
-    masses : sequence of float
-        [kg/m]
-    """
-    angle = np.radians(response["theta"].values)
-    states = [("initial", response.isel(time=0))]
-    states += [(f"{mass:.0f} kg/m", postprocess.at_inflow(response, mass)) for mass in masses]
-    colours = [INITIAL, *mass_colours(len(masses))]
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(7.4, 3.2), layout="constrained")
-        axes = figure.subplots(1, 3, subplot_kw={"projection": "polar"})
-        for axis, name in zip(axes, FORCES, strict=True):
-            crown_up(axis)
-            axis.plot(*closed_curve(angle, 0 * angle), color="0.2", lw=0.8)
-            values = [SHOWN[name].scale * state[name].values for _, state in states]
-            for k, ((label, _), row) in enumerate(zip(states, values, strict=True)):
-                dashes = {"ls": (0, (4, 2)), "lw": 1.1} if k == 0 else {}
-                axis.plot(*closed_curve(angle, row), color=colours[k], label=label, **dashes)
-            around_zero(axis, *values)
-            axis.set_title(SHOWN[name].label, pad=10)
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
-    return figure
+def forces_by_inflow(response, masses, gate):
+    """N, Q and M around the ring, initial and at some inflow masses [kg/m]; gate: its angle [degree]."""
+    panels = [
+        (SHOWN[name].label,
+         [(label, SHOWN[name].scale * state[name].values, style) for label, state, style in _states(response, masses)])
+        for name in FORCES
+    ]  # fmt: skip
+    return rings(panels, 3, gate, response["joint_angle"].values)
 
 
 def extremes_over_inflow(responses):
-    """Largest and smallest N, Q and M over inflow mass, one line style a lining model.
-
-    Parameters
-    ----------
-    responses : dict of str to xarray.Dataset
-        By lining model.
-    """
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(7.4, 2.8), layout="constrained")
-        axes = figure.subplots(1, 3)
-        for (model, response), style in zip(responses.items(), ("-", "--", ":", "-."), strict=False):
+    """Largest and smallest N, Q and M over inflow mass, one line style a lining model (name to response)."""
+    styles = {"_max": ("largest", NOW), "_min": ("smallest", "#c1272d")}
+    curves = []
+    for name in FORCES:
+        lines = []
+        for (model, response), dashes in zip(responses.items(), ("-", "--", ":", "-."), strict=False):
             found = postprocess.extremes(response)
-            mass = response["inflow_mass"]
-            for axis, name in zip(axes, FORCES, strict=True):
-                axis.plot(mass, SHOWN[name].scale * found[f"{name}_max"], style, color=NOW, label=f"largest, {model}")
-                axis.plot(
-                    mass, SHOWN[name].scale * found[f"{name}_min"], style, color="#c1272d", label=f"smallest, {model}"
-                )
-                axis.set_ylabel(SHOWN[name].label)
-                axis.set_xlabel("inflow mass [kg/m]")
-                axis.grid(True)
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
-    return figure
+            lines += [(f"{word}, {model}", response["inflow_mass"], found[name + end] * SHOWN[name].scale,
+                       {"color": colour, "ls": dashes}) for end, (word, colour) in styles.items()]  # fmt: skip
+        curves.append((SHOWN[name].label, lines))
+    return _over_inflow(curves)
 
 
 def joints_over_inflow(response):
     """Opening, dislocation and rotation of every joint over inflow mass, response of one lining model."""
     mass = response["inflow_mass"]
+    return _over_inflow([
+        (title, [(f"joint {joint}", mass, scale * response[name].sel(joint=joint), {"color": f"C{k}"})
+                 for k, joint in enumerate(response["joint"].values)])
+        for name, (title, scale) in JOINTS.items()
+    ])  # fmt: skip
+
+
+def _over_inflow(panels):
+    """Panels beside each other over inflow mass: (title, list of (label, mass, values, keys of a line))."""
     with matplotlib.rc_context(STYLE):
         figure = Picture(figsize=(7.4, 2.8), layout="constrained")
-        axes = figure.subplots(1, 3)
-        for axis, (name, (title, scale)) in zip(axes, JOINTS.items(), strict=True):
-            for k, joint in enumerate(response["joint"].values):
-                axis.plot(mass, scale * response[name].sel(joint=joint), color=f"C{k}", label=f"joint {joint}")
+        axes = figure.subplots(1, len(panels))
+        for axis, (title, lines) in zip(axes, panels, strict=True):
+            for label, mass, values, style in lines:
+                axis.plot(mass, values, label=label, **style)
             axis.set_ylabel(title)
             axis.set_xlabel("inflow mass [kg/m]")
             axis.grid(True)
