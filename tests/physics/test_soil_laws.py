@@ -26,14 +26,16 @@ def clay_scene(**changes):
 
 
 def test_every_law_of_the_page_is_there_with_its_keys():
-    rows = re.findall(r"^\| `([\w-]+)` \| (.*?) \| (.*?) \|", PAGE.read_text(), re.M)
-    assert sorted(name for name, _, _ in rows) == [name for name in mpm.soil_law_names() if name != "wearing-sand"]
-    for name, keys, history in rows:
+    rows = [line.split("|")[1:4] for line in PAGE.read_text().splitlines() if line.startswith("| `")]
+    names = [name.strip(" `") for name, _, _ in rows]
+    assert sorted(names) == [name for name in mpm.soil_law_names() if name != "wearing-sand"]
+    for name, (_, keys, history) in zip(names, rows, strict=True):
         law = soil_law(name)
         assert set(re.findall(r"`(\w+)`", keys)) <= set(law.model_fields)
         assert re.findall(r"`(\w+)`", history) == [entry[0] for entry in law.history]
 
 
+@pytest.mark.slow
 def test_law_of_the_page_runs_and_wears(tmp_path):
     example, use = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.S)
     names = {}
@@ -44,10 +46,11 @@ def test_law_of_the_page_runs_and_wears(tmp_path):
     coupling.run(scene, out=tmp_path / "run", figures=False)
     points = coupling.read_run(tmp_path / "run")["points"].isel(time=-1)
     assert points["worn"].attrs["units"] == "1" and points["worn"].max() > 0.01
-    # all strain wears, in the drained initial state as in the event
-    assert float((points["worn"] - points["deviatoric_strain"]).min()) > -1e-6
+    # what has no effective stress is not strained by a law
+    assert float((points["worn"] - points["deviatoric_strain"]).max()) < 1e-6
 
 
+@pytest.mark.slow
 def test_clay_flows_through_the_gate_and_remembers_its_pressure():
     scene = clay_scene(stop={"time": 0.05}, output={"interval": 0.05}, ring="none")
     simulation = mpm.Simulation(scene)
@@ -55,7 +58,7 @@ def test_clay_flows_through_the_gate_and_remembers_its_pressure():
     start = simulation.solver.points["preconsolidation_pressure"].copy()
     last = simulation.advance()
     points = simulation.solver.points
-    assert simulation.done and last.inflow_mass > 0 and np.isfinite(points["stress_xx"]).all()
+    assert simulation.done and last.flow_zone_area > 0 and np.isfinite(points["stress_xx"]).all()
     assert (start > 0).all() and (
         points["preconsolidation_pressure"] < start * (1 - 1e-3)
     ).any()  # it softens at the gate

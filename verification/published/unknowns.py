@@ -39,10 +39,10 @@ def finished(folder: str | Path) -> list[CaseRun]:
     coupling.studies.design.StudyError
         A study that is damaged.
     """
-    from coupling.studies.folder import RUN_FOLDER
     from coupling.studies.collect import stored_cases
     from coupling.studies.design import STUDY_FILE
     from coupling.studies.execute import case_file
+    from coupling.studies.folder import RUN_FOLDER
 
     if not (Path(folder) / STUDY_FILE).is_file():
         return []
