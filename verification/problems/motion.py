@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from mpm.fields import CONTACT_RECORD, REACTION_RECORD
 from mpm.solver import Solver
 from verification.boxes import STRESS, box_mesh, box_scene, clear_stress, put, run_to, state
 from verification.driven import DrivenSolver
@@ -44,8 +45,10 @@ def rough_floor(solver, floor, normal, friction):
     count = len(floor)
     solver.contact_of_node[floor] = np.arange(count, dtype=np.int32)
     solver.n_contact = count
-    solver.normal, solver.active = np.tile(normal, (count, 1)), np.ones(count, np.int8)
-    solver.friction, solver.impulse = np.full(count, friction), np.zeros((count, 5))
+    solver.contact, solver.impulse = np.zeros(count, CONTACT_RECORD), np.zeros(count, REACTION_RECORD)
+    solver.wall = np.zeros((count, 2))
+    solver.contact["normal_x"], solver.contact["normal_y"] = normal
+    solver.contact["active"], solver.contact["friction"] = 1.0, friction
 
 
 def sliding_block(cells=5, slope=30.0, friction=0.2, duration=0.5, **numerics):

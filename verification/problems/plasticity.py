@@ -243,7 +243,7 @@ def random_paths(
     """
     cohesion = 2e4
     element = Element(cohesion, friction_angle, dilatancy_angle, tensile_strength)
-    planes = yield_planes(cohesion, friction_angle, dilatancy_angle, element.parameters[6])
+    planes = yield_planes(cohesion, friction_angle, dilatancy_angle, element.parameters[2][4])
     rates = strain_paths(paths, pieces, mean, seed)
     error, seconds = timed(lambda: path_error(element, planes, rates, increments))
     return Result(error, steps=increments * pieces, points=paths, cpu_seconds=seconds)
