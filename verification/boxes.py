@@ -165,8 +165,8 @@ def hat_functions(solver):
     """Values of the three hat functions of its element at every point in the mesh: (n_inside, 3)."""
     here = inside(solver)
     g = solver.geometry[solver.element_of_point[here]]
-    dx, dy = (state(solver, "x", "y")[here] - g[:, 4:6]).T
-    first, second = g[:, 0] * dx + g[:, 1] * dy, g[:, 2] * dx + g[:, 3] * dy
+    dx, dy = state(solver, "x")[here] - g["x"], state(solver, "y")[here] - g["y"]
+    first, second = g["dn1_dx"] * dx + g["dn1_dy"] * dy, g["dn2_dx"] * dx + g["dn2_dy"] * dy
     return np.column_stack([1 - first - second, first, second])
 
 

@@ -37,7 +37,7 @@ def patches(solver):
     corners, count = mesh.elements[solver.element_of_point[here]], len(mesh.nodes)
     share = hat_functions(solver) * volumes(solver)[here, None]
     volume = np.bincount(corners.ravel(), share.ravel(), count)
-    area = np.bincount(mesh.elements.ravel(), np.repeat(solver.geometry[:, 6] / 3, 3), count)
+    area = np.bincount(mesh.elements.ravel(), np.repeat(solver.geometry["area"] / 3, 3), count)
     return area, volume, np.minimum(volume, area)
 
 
