@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from mpm.fields import CLAMPS, POROSITY_CEILING, POROSITY_FLOOR
+from mpm.fields import CLAMPS, POROSITY_CEILING, POROSITY_FLOOR, numbers
 from verification.boxes import STRESS, inside, state, volumes
 
 ENERGY_SLACK = 0.05  # of the largest energy in play: volumes change, points change elements
@@ -71,7 +71,7 @@ class Monitor:
         """What is wrong, one sentence each; empty for a sound run."""
         self.check()
         solver, here, faults = self.solver, inside(self.solver), []
-        if not np.isfinite(solver.points[here]).all():
+        if not np.isfinite(numbers(solver.points[here])).all():
             faults.append("a point is not finite")
         if self.created > ENERGY_SLACK * self.in_play:
             share = self.created / self.in_play

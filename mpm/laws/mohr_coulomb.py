@@ -204,10 +204,10 @@ class MohrCoulomb(Elastic):
             import numpy as np  # reading a scene needs none
 
             share = cohesive / np.where(vertical_stress > 0, vertical_stress, np.nan) if cohesive > 0 else 0.0
-        elif vertical_stress <= 0:
+        elif cohesive > 0 and vertical_stress <= 0:
             return -math.inf, math.inf
         else:
-            share = cohesive / vertical_stress
+            share = cohesive / vertical_stress if cohesive > 0 else 0.0
         return (1 - sine - share) / (1 + sine), (1 + sine + share) / (1 - sine)
 
     @staticmethod

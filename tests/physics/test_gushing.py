@@ -136,7 +136,7 @@ def test_sink_takes_material_out_and_counts_it():
         solver.step()
     gone = solver.element_of_point < 0
     tunnel = scene.tunnels[0]
-    radius = np.hypot(solver.points["x"] - tunnel.x, solver.points[:, 1] + tunnel.axis_depth)
+    radius = np.hypot(solver.points["x"] - tunnel.x, solver.points["y"] + tunnel.axis_depth)
     # what has passed the inner face's circle, but not yet the edge of its polygon, is inside as well
     came = np.sum(solver.points["grain_mass"][gone | (radius < tunnel.inner_radius)])
     assert gone.any() and solver.inflow_mass() == pytest.approx(came, rel=1e-12)

@@ -7,6 +7,7 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
+from mpm.fields import block
 from mpm.solver import Solver
 from verification.monitor import Monitor, follow
 from verification.pages import Page
@@ -87,7 +88,7 @@ def test_a_run_with_spectral_steps_takes_longer_ones_to_the_same_end():
         scene = block_scene(0.1)
         numerics = scene.numerics.model_copy(update={"critical_step": way})
         solver = Solver(scene.model_copy(update={"numerics": numerics}), box_of(0.1, 0, 12, 0, 8), threads=1)
-        solver.points[:, 2] = 1e-3 * np.cos(np.pi * solver.points[:, 0] / 1.2)  # a long wave
+        solver.points["velocity_solid_x"] = 1e-3 * np.cos(np.pi * solver.points["x"] / 1.2)  # a long wave
         while solver.time < 0.02 * (1 - 1e-12):
             solver.step(0.02 - solver.time)
         ends[way] = solver.step_count, solver.points_by_name()["pore_pressure"]
@@ -120,13 +121,13 @@ def test_energy_from_nothing_is_found():
     class Pushed(Solver):
         def step(self, dt_max=math.inf):
             done = super().step(dt_max)
-            self.points[:, 2:4] *= 1.01
+            block(self.points, "velocity_solid_x", "velocity_solid_y")[:] *= 1.01
             return done
 
     faults = {}
     for kind in (Solver, Pushed):
         solver = kind(block_scene(0.1, bulk_modulus=None), box_of(0.1, 0, 6, 0, 6), threads=1)
-        solver.points[:, 2] = 1e-3 * np.cos(np.pi * solver.points[:, 0] / 0.6)
+        solver.points["velocity_solid_x"] = 1e-3 * np.cos(np.pi * solver.points["x"] / 0.6)
         faults[kind], _ = follow(Monitor(solver), 0.1)
     assert not any("energy from nothing" in fault for fault in faults[Solver])
     faults = faults[Pushed]

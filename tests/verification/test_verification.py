@@ -4,7 +4,8 @@ import inspect
 
 import pytest
 
-from mpm.scene import Numerics, Soil, Water
+from mpm.laws.law import built_in_laws
+from mpm.scene import Numerics, Water
 from verification.accuracy.orders import observed_order
 from verification.problems import problems
 from verification.problems.exact_plasticity import exact_path, stiffness, yield_planes
@@ -25,7 +26,8 @@ def test_settings_of_the_ladder_exist(problem):
     known = inspect.signature(problem.solve).parameters.values()
     names = {parameter.name for parameter in known}
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in known):  # handed through to the scene
-        names |= {"points", *Numerics.model_fields, *Water.model_fields, *Soil.model_fields}
+        names |= {"points", *Numerics.model_fields, *Water.model_fields}
+        names |= {key for law in built_in_laws() for key in law.model_fields}
     assert set(problem.fast) | set(problem.ladder) <= names
     assert all(len(values) > 1 for values in problem.ladder.values())
 
