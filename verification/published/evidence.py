@@ -22,7 +22,6 @@ from coupling.datasets import (
     read_response,
 )
 from coupling.datasets.geometry import on_tunnel
-from mpm.fields import values
 
 #: Inflow masses that the source looks at [kg/m]: 1000 is that of its comparisons, 2000 the end of its runs.
 MASSES = (250.0, 500.0, 1000.0, 2000.0)
@@ -140,7 +139,7 @@ class RunEvidence:
 
         from coupling.responses.respond import respond
 
-        ours = values(self.of_gate, ("soil_pressure", "water_pressure", "soil_shear", "inflow_mass"))
+        ours = self.of_gate[["soil_pressure", "water_pressure", "soil_shear", "inflow_mass"]]
         parts = [ours.isel(time=0)]
         parts += [postprocess.at_inflow(ours, mass) for mass in (COMPARED, LAST) if mass <= self.reached]
         parts = [part.drop_vars(["time", "inflow_mass"]) for part in parts]

@@ -16,7 +16,6 @@ import xarray as xr
 from coupling.figures import GATE, INITIAL, NOW, RESOLUTION, SECOND
 from coupling.figures.utilisations import checks
 from coupling.scenes.scene import load_scene
-from mpm.fields import values
 from structure import BeamSpringLining, Limits, check
 from structure.joint_laws import contact_moment, limited_shear
 from verification.loads import falling_pressures
@@ -108,7 +107,7 @@ def joint_laws(path):
         right.legend(loc="upper left")
         for axis in (left, right):
             axis.grid(True, color="0.9")
-            values(axis.spines, ("top", "right")).set_visible(False)
+            axis.spines[["top", "right"]].set_visible(False)
 
 
 def example_of_checks(scene, limits):
