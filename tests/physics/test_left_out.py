@@ -53,9 +53,9 @@ def test_dry_scene_is_the_limit_of_water_without_weight_and_stiffness():
     wet = stepped(scene(water=nothing), weightless=True)
     moved = np.hypot(dry.points["velocity_solid_x"], dry.points["velocity_solid_y"]).max()
     assert moved > 1e-3
-    assert np.abs(dry.points[:, MOTION] - wet.points[:, MOTION]).max() < 1e-9
-    scale = np.abs(dry.points[:, STRESS]).max()
-    assert np.abs(dry.points[:, STRESS] - wet.points[:, STRESS]).max() < 1e-8 * scale
+    assert np.abs(values(dry.points, MOTION) - values(wet.points, MOTION)).max() < 1e-9
+    scale = np.abs(values(dry.points, STRESS)).max()
+    assert np.abs(values(dry.points, STRESS) - values(wet.points, STRESS)).max() < 1e-8 * scale
 
 
 def test_elastic_scene_is_the_limit_of_a_strength_that_is_never_reached():
@@ -103,9 +103,9 @@ def test_frictionless_scene_is_the_limit_of_vanishing_friction():
     smooth, rough = states
     assert not smooth.impulse["shear"].any() and smooth.impulse["soil"].any() and rough.impulse["shear"].any()
     # the shear is 1e-12 of the pressure, and 60 steps and the relaxation add it up
-    scale = np.abs(smooth.points[:, STRESS]).max()
-    assert np.abs(smooth.points[:, STRESS] - rough.points[:, STRESS]).max() < 1e-8 * scale
-    assert np.abs(smooth.points[:, MOTION] - rough.points[:, MOTION]).max() < 1e-8
+    scale = np.abs(values(smooth.points, STRESS)).max()
+    assert np.abs(values(smooth.points, STRESS) - values(rough.points, STRESS)).max() < 1e-8 * scale
+    assert np.abs(values(smooth.points, MOTION) - values(rough.points, MOTION)).max() < 1e-8
 
 
 def test_undrained_ground_needs_no_smaller_step_and_is_the_limit_of_falling_permeability():

@@ -6,11 +6,7 @@ from test_heap import box_mesh
 
 import coupling
 import mpm
-from mpm.fields import (
-    CLAMPS,
-    block,
-    values,
-)
+from mpm.fields import block, numbers, values
 from mpm.scene import Scene
 from mpm.solver import Solver
 
@@ -67,7 +63,7 @@ def test_filter_leaves_alone_what_points_on_a_line_can_not_tell():
     rng = np.random.default_rng(1)
     rows["pore_pressure"] = before = rng.uniform(1e4, 1e5, solver.n_points)
     solver.step(1e-12)
-    assert np.isfinite(rows).all()
+    assert np.isfinite(numbers(rows)).all()
     assert np.abs(rows["pore_pressure"] - before).max() < 1.0  # what moves in 1e-12 s
 
 
@@ -99,10 +95,7 @@ def test_points_keep_their_water_however_they_are_strained():
         solver.step(2e-5)
     assert np.abs(solver._volumes() / volume - 1).max() > 0.01
     assert rows["pore_pressure"].min() < 0.0 < rows["pore_pressure"].max()
-    assert (
-        solver.clamps.sum(axis=0)[[list(CLAMPS).index(name) for name in ("porosity_floor", "porosity_ceiling")]].sum()
-        == 0
-    )
+    assert not any(solver.clamps[name].any() for name in ("porosity_floor", "porosity_ceiling"))
     assert np.abs(solver._held_water(solver._pore_water()) / before - 1).max() < 1e-12
 
 

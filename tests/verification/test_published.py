@@ -199,7 +199,8 @@ def test_rules_on_the_trough_pass_and_fail():
 
 
 def test_studies_are_valid_and_a_look_is_coarse():
-    from coupling.studies.design import cases, load_study
+    from coupling.studies.cases import cases
+    from coupling.studies.design import load_study
 
     studies = {plan["name"]: cases(load_study(plan)) for plan in plans()}
     assert [len(found) for found in studies.values()] == [11, 4, 17, 4]

@@ -36,5 +36,5 @@ def independent_rates(scene) -> dict[str, float]:
         "heavy liquid": float(grains * discharge),
         "water": float(scene.water.density * discharge),
         "dry hopper": float(SLOT * grains * np.sqrt(scene.gravity) * gate.width**1.5),
-        "seepage": float(seepage(scene)),
+        "seepage": float(seepage(scene, soil.hydraulic_conductivity)),
     }
