@@ -38,7 +38,8 @@ from importlib import resources
 
 import coupling
 import structure
-from coupling.studies.design import cases, load_study, study_names
+from coupling.studies.cases import cases
+from coupling.studies.design import load_study, study_names
 
 assert {"quick", "case-3", "twin-tunnels"} <= set(coupling.scene_names())
 assert all(cases(load_study(name)) for name in study_names()) and study_names()
