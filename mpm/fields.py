@@ -18,8 +18,8 @@ class Field(NamedTuple):
     meaning: str
 
 
-#: A material point: two cache lines, so that a point costs two memory accesses whatever is read of it. History
-#: variables of the soil laws of a scene follow (`mpm.laws`).
+#: A material point: two cache lines, so that a point costs two memory accesses whatever is read of it. The history of
+#: a scene's soil laws (`mpm.laws`) comes before it: numba takes a record that another one begins with for the same.
 POINT = (
     Field("x", "m", "horizontal position"),
     Field("y", "m", "vertical position, upward, ground surface at 0"),

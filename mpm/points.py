@@ -65,7 +65,7 @@ def fill(mesh, scene):
 
     Returns
     -------
-    points : (n_points,) records of `mpm.fields.POINT` and the history of the soils' laws
+    points : (n_points,) records of the history of the soils' laws and `mpm.fields.POINT`
     element_of_point, soil_of_point : (n_points,) int32
     """
     nodes, elements = mesh.nodes, mesh.elements
@@ -88,7 +88,7 @@ def fill(mesh, scene):
         )
         of_cell = centre.reshape(-1, 4, 2).mean(axis=1)
         near_gate = np.repeat(np.hypot(*(of_cell - gate).T) < d.gate_radius, 4)
-    parts, owner, kind = [], [], record([*POINT, *(name for name, _, _ in history_of(scene))])
+    parts, owner, kind = [], [], record([*(name for name, _, _ in history_of(scene)), *POINT])
     for count, chosen in (
         (d.points_per_element, soil_elements[~near_gate[soil_elements]]),
         (d.points_per_element_gate, soil_elements[near_gate[soil_elements]]),

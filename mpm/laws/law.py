@@ -31,12 +31,16 @@ _REGISTERED: dict[str, type[Soil]] = {}
 def register_soil_law(name: str, law: type[Soil]) -> None:
     """Make a law known by name in this process: ``model = name`` of a soil then asks for its parameters.
 
+    A class that is defined once more, as when a cell of a notebook is run again, takes the place of its former self.
+
     Raises
     ------
     ValueError
-        The name is taken.
+        The name is taken by another class.
     """
-    if name in soil_law_names() and _REGISTERED.get(name) is not law:
+    former = _REGISTERED.get(name)
+    again = former is not None and (former.__module__, former.__qualname__) == (law.__module__, law.__qualname__)
+    if name in soil_law_names() and not again:
         raise ValueError(f"soil law {name!r}: the name is taken, choose another one")
     _REGISTERED[name] = law
 
@@ -95,22 +99,23 @@ def soil_of_its_law(given: Any, validate: Any) -> Soil:
 
 
 def soil_table(scene: Any) -> Any:
-    """Numbers of the soils that the kernels read: (n_soils,) records of `COMMON` and the constants of their laws."""
+    """Numbers of the soils that the kernels read: (n_soils,) records of the constants of their laws and `COMMON`."""
     import numpy as np  # reading a scene needs none
 
     rows = []
     for soil in scene.soils:
         drag = scene.gravity / soil.hydraulic_conductivity if scene.is_two_phase else 0.0
-        law = float(laws_of(scene).index(soil.model))
+        law = float(laws_of(scene).index(type(soil)))
         common = (law, soil.grain_density, soil.loose_porosity, drag, np.inf)
         rows.append(dict(zip(COMMON, common, strict=True)) | soil.constants)
-    names = dict.fromkeys(name for row in rows for name in row)
+    # what all have comes last: no table may begin with another one's fields (`mpm.fields.POINT`)
+    names = dict.fromkeys([name for soil in scene.soils for name in soil.constants if name not in COMMON] + [*COMMON])
     return np.array([tuple(row.get(name, np.nan) for name in names) for row in rows], [(name, float) for name in names])
 
 
-def laws_of(scene: Any) -> tuple[str, ...]:
-    """Names of the laws of a scene's soils."""
-    return tuple(dict.fromkeys(soil.model for soil in scene.soils))
+def laws_of(scene: Any) -> tuple[type[Soil], ...]:
+    """Classes of the laws of a scene's soils."""
+    return tuple(dict.fromkeys(type(soil) for soil in scene.soils))
 
 
 def history_of(scene: Any) -> tuple[tuple[str, str, str], ...]:
@@ -119,22 +124,22 @@ def history_of(scene: Any) -> tuple[tuple[str, str, str], ...]:
 
 
 @cache
-def stress_kernel(laws: tuple[str, ...]) -> Any:
+def stress_kernel(laws: tuple[type[Soil], ...]) -> Any:
     """Kernel `new_stress` of the soils of some laws, which takes and gives what :class:`mpm.laws.soil.Soil` says."""
     return _of_any(laws, "new_stress")
 
 
 @cache
-def moduli_kernel(laws: tuple[str, ...]) -> Any:
+def moduli_kernel(laws: tuple[type[Soil], ...]) -> Any:
     """Kernel `moduli` of the soils of some laws."""
     return _of_any(laws, "moduli")
 
 
-def _of_any(laws: tuple[str, ...], name: str, number: int = 0) -> Any:
+def _of_any(laws: tuple[type[Soil], ...], name: str, number: int = 0) -> Any:
     """The function `name` of the first of some laws for soils of that number, of the others for the rest."""
     from mpm.machine.compile import kernel_part
 
-    law = soil_law(laws[0])
+    law = laws[0]
     first = compiled(*law.helpers, getattr(law, name))[-1]
     if len(laws) == 1:
         return first

@@ -19,7 +19,7 @@ class Needs(NamedTuple):
     two_phase: bool  # with a velocity of its own
     tied: bool  # levels of local time stepping
     moving: bool  # linings that move
-    laws: tuple[str, ...]  # names of the soils' laws
+    laws: tuple[type, ...]  # classes of the soils' laws
 
 
 class Layout(NamedTuple):
