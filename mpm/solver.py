@@ -32,7 +32,6 @@ from mpm.step.cells import fill_cells
 from mpm.step.sort import cut_by_work, sort_by_element
 from mpm.step.substep import (
     ACTIVE,
-    FOLLOW,
     LARGEST_COURANT,
     OCCUPIED,
     PLAN,
@@ -120,7 +119,6 @@ class Solver(Measures):
         self._counts, self._measures = np.zeros(5, np.int64), np.zeros(2)
         self._limits = np.zeros((2 * PARTS, 2))
         self._suspended, self._bad, self._n_left, self._first_left = np.zeros((4, PARTS), np.int64)
-        self._used = np.zeros(0, np.int64)  # processor time of the passes: not measured
         self.start = np.zeros(m + 1, np.int32)
         self.order = np.zeros(len(self.points), np.int32)
         self.occupied = np.zeros(m, np.int32)
@@ -142,7 +140,7 @@ class Solver(Measures):
         self.initial_volume = self._volumes()
         self.initial_grain_mass = float(np.sum(self.points["grain_mass"]))
         self.initial = self.sums_over_points()
-        self._spare = self.start.copy(), self.order.copy()
+        self._spare = self.order.copy()
         # points that left their element, and that element
         self._left = np.zeros((2, len(self.points)), np.int32)
         self._spectrum, self.longest_step, self.mode = None, math.inf, None  # and the spectral step [s] and its mode
@@ -293,7 +291,7 @@ class Solver(Measures):
         fill_cells(self.geometry, self.contents)
         self.sums[:] = 0.0
         self.clock.map_only()
-        self._run(UPDATE, FOLLOW, advance=False)
+        self._run(UPDATE, UPDATE, advance=False)
         self._mapped = True
 
     def relax(self, progress=None):
@@ -416,25 +414,24 @@ class Solver(Measures):
             self._cuts, self.clock, self._pace, self.medium,
             Tally(
                 self._counts, self._measures, self._limits, self._suspended, self._bad, self._n_left,
-                self._first_left, self.clamps, self.ledger, *self._left, *self._spare, self._used,
+                self._first_left, self.clamps, self.ledger, *self._left, self._spare,
             ),
         )  # fmt: skip
 
     def _advance(self, batch):
         """All passes of long steps."""
         if self.moving is None:
-            self._run(PLAN, FOLLOW, batch)
+            self._run(PLAN, UPDATE, batch)
             return
         self._run(PLAN, PLAN, batch)
         self.moving.advance(self.system(), float(self.clock.dt_of_level[0]))  # all levels are one
-        self._run(SOLVE, FOLLOW)
+        self._run(SOLVE, UPDATE)
 
     def _run(self, first_pass, last_pass, batch=None, advance=True):
         """Some passes (`mpm.step.substep.PASSES`) of all substeps, by all threads; None: of a long step planned."""
         if batch is None:
-            batch = Batch(
-                self.clock.periods[-1:].copy() if advance else np.ones(1, np.int64), np.zeros(0, np.int64), 0, 0
-            )
+            substeps = self.clock.periods[-1] if advance else 1
+            batch = Batch(np.array([substeps, 0]), np.zeros(0, np.int64), 0, 0)
         counts = self._counts
         counts[:] = self.n_occupied, self.n_active, self.suspended, 0, 0
         self._measures[:] = self.largest_courant, self.removed_mass

@@ -4,7 +4,7 @@ import numpy as np
 
 from mpm.fields import block
 from mpm.solver import Solver
-from mpm.step.substep import ADVANCE, FOLLOW, PLAN, REMAP, SOLVE, UPDATE
+from mpm.step.substep import ADVANCE, PLAN, REMAP, SOLVE, UPDATE
 from mpm.walls.contact import FIXED_X, FIXED_Y
 
 
@@ -51,7 +51,7 @@ class DrivenSolver(Solver):
         block(self.nodes, "velocity_liquid_x", "velocity_liquid_y")[self.driven_liquid] = self.velocity_liquid[
             self.driven_liquid
         ]
-        self._run(UPDATE, FOLLOW)
+        self._run(UPDATE, UPDATE)
 
     def _drive(self, dt):
         row = self.nodes

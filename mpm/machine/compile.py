@@ -37,13 +37,21 @@ def kernel(function, **options):
 def kernel_part(function, allocates=False):
     """A kernel that only other kernels call. It has no machine code of its own: called from Python it crashes.
 
-    Arrays are the caller's and live as long as it runs. So they are not counted: of every array taken out of a group
-    numba would count the references, with atomic instructions that two threads wait for.
+    Arrays are not counted, as in :func:`step_kernel`.
 
     allocates : bool
         Whether it makes arrays of its own, which have to be counted.
     """
     return _compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=allocates)
+
+
+def step_kernel(function):
+    """A kernel that makes no arrays. Those it is given are the caller's and live as long as it runs.
+
+    So they are not counted: of every array taken out of a group numba would count the references, with atomic
+    instructions that two threads wait for.
+    """
+    return kernel(function, _nrt=False)
 
 
 allocating_part = partial(kernel_part, allocates=True)
@@ -56,11 +64,19 @@ def integer_kernel(function):
 
 def _compiled(function, **options):
     function.__qualname__ = variant_name(function)
-    return numba.njit(**{**OPTIONS, **options})(function)
+    compiled = numba.njit(**{**OPTIONS, **options})(function)
+    of_types = compiled.get_call_template
+
+    def of_plain_types(args, kws):
+        """numba would compile a kernel for the 0 that a counter begins with, and once more for the counter."""
+        return of_types(tuple(map(types.unliteral, args)), {name: types.unliteral(kind) for name, kind in kws.items()})
+
+    compiled.get_call_template = of_plain_types
+    return compiled
 
 
 def inline_kernel(function):
-    """A kernel that is written out where others call it."""
+    """A kernel that is written out where others call it: parts that stand in one another are optimised once each."""
     return kernel(function, inline="always")
 
 

@@ -109,7 +109,7 @@ class Team(NamedTuple):
 
     thread: int
     meeting: np.ndarray
-    at: np.ndarray  # (2,) int64: number of the stage at hand; processor time when the thread last looked [us]
+    at: np.ndarray  # (1,) int64, number of the stage at hand
 
 
 @kernel_part

@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor, wait
 
 import numpy as np
 
-from mpm.machine.team import meeting_width, stage_at_hand
+from mpm.machine.team import Team, meeting_width, stage_at_hand
 
 
 def check_threads(threads):
@@ -38,7 +38,7 @@ class Threads:
         self._meeting = np.zeros(meeting_width(most_parts), np.int64)
 
     def together(self, kernel, *arguments):
-        """Run a kernel of many stages by all threads: kernel(thread, meeting, first stage, *arguments).
+        """Run a kernel of many stages by all threads: kernel(team, *arguments).
 
         One that is late finds all done by the others (`mpm.machine.team`), so nobody waits for its end.
 
@@ -48,10 +48,11 @@ class Threads:
             The other threads.
         """
         stage, others = stage_at_hand(self._meeting), []
+        teams = [Team(thread, self._meeting, np.array([stage])) for thread in range(self.count)]
         try:
-            for thread in range(1, self.count):
-                others.append(self._pool.submit(kernel, thread, self._meeting, stage, *arguments))
-            kernel(0, self._meeting, stage, *arguments)
+            for team in teams[1:]:
+                others.append(self._pool.submit(kernel, team, *arguments))
+            kernel(teams[0], *arguments)
         except BaseException:  # an interrupt: the others would go on behind the caller's back
             wait(others)
             raise

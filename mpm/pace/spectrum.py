@@ -25,8 +25,8 @@ import numpy as np
 
 from mpm.fields import record
 from mpm.laws.law import moduli_kernel
-from mpm.machine.compile import index, kernel, kernel_part
-from mpm.machine.team import Team, shared
+from mpm.machine.compile import index, inline_kernel, kernel_part, step_kernel
+from mpm.machine.team import shared
 from mpm.step.cells import felt_share
 from mpm.step.nodes_to_points import shares
 from mpm.step.points_to_nodes import gradients
@@ -111,7 +111,7 @@ def gather_kernel(needs):
         held.water_by_grains *= share
         held.water_by_water *= share
 
-    @kernel_part
+    @inline_kernel
     def gather(team, ground, medium, o):
         """Sum the points in elements and nodes, by all threads."""
         parts = o.at_nodes.shape[0]
@@ -130,7 +130,7 @@ def gather_kernel(needs):
     return gather
 
 
-@kernel_part
+@inline_kernel
 def take(at_nodes, i, column):
     """Sum of the parts in a column of a node, which are cleared."""
     total = 0.0
@@ -189,7 +189,7 @@ def accelerate(i, o, drag_time):
             o.acceleration[i, axis] = total / m.solid if o.free[i, axis] else 0.0
 
 
-@kernel_part
+@inline_kernel
 def dot(dots, k):
     """Sum of the parts of a dot product."""
     total = 0.0
@@ -230,7 +230,7 @@ def krylov_kernel(needs):
             returned[b, x] += m[1] * u + m[3] * v + m[4] * w
             returned[c, x] += m[2] * u + m[4] * v + m[5] * w
 
-    @kernel_part
+    @inline_kernel
     def apply(team, ground, o, drag_time, velocity, image):
         """The operator: nodal velocities to accelerations, with changed sign, by all threads.
 
@@ -253,7 +253,7 @@ def krylov_kernel(needs):
                     total = take(o.at_nodes, i, x)
                     image[i, x] = -total / mass if o.free[i, x % 2] else 0.0
 
-    @kernel_part
+    @inline_kernel
     def orthogonalise(team, o, j, flat, hessenberg):
         """Make vector j + 1 a unit vector at right angles to those before, by all threads."""
         parts = o.at_nodes.shape[0]
@@ -278,8 +278,8 @@ def krylov_kernel(needs):
                     hessenberg[k, j] = dot(o.dots, k)
                 hessenberg[j + 1, j] = norm
 
-    @kernel
-    def build_krylov(thread, meeting, stage, fresh, ground, medium, operator, drag_time, basis, hessenberg):
+    @step_kernel
+    def build_krylov(team, fresh, ground, medium, operator, drag_time, basis, hessenberg):
         """Arnoldi's process: orthonormal vectors that span the powers of the operator on the first of them.
 
         Sums run over fixed parts, so the bits do not depend on the threads.
@@ -293,7 +293,6 @@ def krylov_kernel(needs):
         hessenberg : (k + 1, k) float64
             Written; zeros at first.
         """
-        team = Team(thread, meeting, np.array([stage, 0]))
         flat = basis.reshape(basis.shape[0], width * basis.shape[1])
         if fresh:
             gather(team, ground, medium, operator)

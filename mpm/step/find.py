@@ -4,10 +4,10 @@ from functools import cache
 
 import numpy as np
 
-from mpm.machine.compile import allocating_part, kernel_part
+from mpm.machine.compile import allocating_part, inline_kernel, kernel_part
 from mpm.step.nodes_to_points import shares
 from mpm.step.points_to_nodes import map_kernel, time_limit
-from mpm.step.sort import update_order
+from mpm.step.sort import ascend, pair, unpair, update_order
 
 
 @kernel_part
@@ -69,7 +69,7 @@ def locate_kernel(needs):
     """Kernel `locate` for what a scene needs (`mpm.step.system.Needs`)."""
     tied, map_point = needs.tied, map_kernel(needs)
 
-    @kernel_part
+    @inline_kernel
     def locate(left, n_left, origin, own, finished, system):
         """Find the new element of every point that left its own, walking over neighbours, and map it there.
 
@@ -126,8 +126,7 @@ def follow_points(system, n_occupied):
     element_of_point, points = ground.element_of_point, ground.points
     start, order, occupied = ground.start, ground.order, ground.occupied
     left, origin, first_left, n_left = tally.left, tally.origin, tally.first_left, tally.n_left
-    spare_start, spare_order = tally.spare_start, tally.spare_order
-    moved, n_moved, removed = np.empty(total(n_left), np.int32), 0, 0.0
+    moved, n_moved, removed = np.empty(total(n_left), np.int64), 0, 0.0
     for part in range(n_left.size):
         for k in range(first_left[part], first_left[part] + n_left[part]):
             i = left[k]
@@ -143,22 +142,16 @@ def follow_points(system, n_occupied):
             else:
                 removed += points[i].grain_mass
             if e != origin[k]:
-                moved[n_moved] = k
+                moved[n_moved] = pair(i, origin[k])
                 n_moved += 1
     if n_moved == 0:
         return n_occupied, start[start.size - 1], removed
-    moved_point, moved_from = np.empty(n_moved, np.int32), np.empty(n_moved, np.int32)
-    for k in range(n_moved):
-        moved_point[k] = left[moved[k]]
-    ascending = np.argsort(moved_point, kind="mergesort")
-    for k in range(n_moved):
-        moved_point[k], moved_from[k] = left[moved[ascending[k]]], origin[moved[ascending[k]]]
+    ascend(moved, n_moved)
     n_occupied, n_active = update_order(
-        element_of_point, moved_point, moved_from, n_moved, start, order, occupied, n_occupied, spare_start, spare_order
+        element_of_point, moved, n_moved, start, order, occupied, n_occupied, tally.spare
     )
     for k in range(n_moved):
-        e = moved_from[k]
-        first = e & ~3
+        first = unpair(moved[k])[1] & ~3
         if start[first + 4] == start[first]:
             for triangle in range(first, first + 4):
                 contents[triangle].fill = 0.0

@@ -256,7 +256,7 @@ def solve_kernel(needs):
             follow_node(i, v, u, dt, begun, net, system.clock.dt_of_level)
         book(m, v, u, force, dt, gravity, ledger)
 
-    @kernel_part
+    @inline_kernel
     def solve_nodes(first, last, own, begun, system):
         """Add up the parts of a range of nodes and advance both phases by the time step of each node's finest level.
 
@@ -357,7 +357,7 @@ def remap_kernel(needs):
         if tied:
             remap_tied_rows(i, v, finished, net, system.clock.dt_of_level)
 
-    @kernel_part
+    @inline_kernel
     def remap_nodes(first, last, finished, system):
         """Nodal velocities from the updated point momenta (MUSL), under the constraints that acted in this step.
 

@@ -119,7 +119,7 @@ def advance_kernel(needs):
             point.x += dt * gx
             point.y += dt * gy
 
-    @kernel_part
+    @inline_kernel
     def advance_points(first, last, own, system):
         """Advance point velocities and positions from the nodes and map new momenta back (MUSL).
 

@@ -310,7 +310,7 @@ def update_kernel(needs):
         push_nodes(e, push, before, runs_ahead, own, system)
         return moved, bad, suspended, np.sqrt(fastest)
 
-    @kernel_part
+    @inline_kernel
     def update_points(first, last, own, left, advance, system):
         """Advance stress, pore pressure and porosity of the points of a range of elements, and map them to the nodes.
 
@@ -349,7 +349,7 @@ def update_kernel(needs):
     return update_points
 
 
-@kernel_part
+@inline_kernel
 def time_limit(e, fastest, system):
     """Altitude of an element over the speed of waves and of its fastest point [m/s], in steps of level 0 [s]."""
     level = system.net.level_of_element[e]

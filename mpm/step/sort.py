@@ -114,69 +114,99 @@ def shift_range(array, spare, first, last, shift):
         array[index(j + shift)] = spare[index(j)]
 
 
+@kernel_part
+def sink(keys, root, end):
+    """Let a number of a heap, which is the first `end` entries, sink below those that are larger."""
+    while 2 * root + 1 < end:
+        child = 2 * root + 1
+        if child + 1 < end and keys[child] < keys[child + 1]:
+            child += 1
+        if keys[root] >= keys[child]:
+            return
+        keys[root], keys[child] = keys[child], keys[root]
+        root = child
+
+
+@kernel_part
+def ascend(keys, count):
+    """Sort the first `count` of some whole numbers in place, by a heap (numpy's sort takes two seconds to compile)."""
+    for parent in range(count // 2 - 1, -1, -1):
+        sink(keys, parent, count)
+    for end in range(count - 1, 0, -1):
+        keys[0], keys[end] = keys[end], keys[0]
+        sink(keys, 0, end)
+
+
+@kernel_part
+def pair(first, second):
+    """Two numbers from 0 to 2^31 in one, ordered by the first."""
+    return (np.int64(first) << 32) + np.int64(second)
+
+
+@kernel_part
+def unpair(key):
+    """The numbers of :func:`pair`."""
+    return key >> 32, key & 0xFFFFFFFF
+
+
 @integer_kernel
-def update_order(
-    element_of_point, moved_point, moved_from, n_moved, start, order, occupied, n_occupied, spare_start, spare_order
-):
+def update_order(element_of_point, moved, n_moved, start, order, occupied, n_occupied, spare):
     """Repair the sorting by element in place after a few points have moved, shifting what lies between their elements.
 
     Equal to `sort_by_element` to the last entry.
 
-    moved_point, moved_from : (n,) int32
-        The first n_moved entries: points, ascending, and the elements that they have left.
-    spare_start, spare_order
-        As `start` and `order`, for copies on the way.
+    moved : (n,) int64
+        The first n_moved entries, ascending: :func:`pair` of a point and the element that it has left.
+    spare
+        As `order`, for copies on the way.
     Returns the number of occupied elements and of points.
     """
     n_elements = start.size - 1
-    listed, touched, n_listed = np.empty(2 * n_moved, np.int32), np.empty(2 * n_moved, np.int32), 0
+    touched, n_listed = np.empty(2 * n_moved, np.int64), 0
+    arriving, n_arriving = np.empty(n_moved, np.int64), 0
     for k in range(n_moved):
-        listed[n_listed] = moved_from[k]
+        i, touched[n_listed] = unpair(moved[k])
         n_listed += 1
-        if element_of_point[moved_point[k]] >= 0:
-            listed[n_listed] = element_of_point[moved_point[k]]
-            n_listed += 1
-    ascending, n_touched, n_held = np.argsort(listed[:n_listed], kind="mergesort"), 0, 0
+        goal = element_of_point[i]
+        if goal >= 0:
+            touched[n_listed], arriving[n_arriving] = goal, pair(goal, i)
+            n_listed, n_arriving = n_listed + 1, n_arriving + 1
+    ascend(touched, n_listed)
+    ascend(arriving, n_arriving)
+    n_touched, n_held = 0, 0
     for k in range(n_listed):
-        e = listed[ascending[k]]
+        e = touched[k]
         if n_touched == 0 or e != touched[n_touched - 1]:
             touched[n_touched] = e
             n_touched += 1
             n_held += start[e + 1] - start[e]
     # the new lists of these elements, one after the other
-    held, n_new = np.empty(n_held + n_moved, np.int32), 0
-    goal = np.empty(n_moved, np.int32)
-    for k in range(n_moved):
-        goal[k] = element_of_point[moved_point[k]]
-    arriving, a = np.argsort(goal, kind="mergesort"), 0
-    ends = np.empty(n_touched, np.int64)
+    held, ends, n_new, a = np.empty(n_held + n_arriving, np.int32), np.empty(n_touched, np.int64), 0, 0
     for t in range(n_touched):
         e = touched[t]
-        while a < n_moved and goal[arriving[a]] < e:
-            a += 1
         read = start[e]
         while True:
-            incoming = a < n_moved and goal[arriving[a]] == e
-            if read < start[e + 1] and (not incoming or order[read] < moved_point[arriving[a]]):
+            coming = -1
+            if a < n_arriving:
+                goal, i = unpair(arriving[a])
+                coming = i if goal == e else -1
+            if read < start[e + 1] and (coming < 0 or order[read] < coming):
                 i = order[read]
                 read += 1
                 if element_of_point[i] == e:
                     held[n_new] = i
                     n_new += 1
-            elif incoming:
-                i = moved_point[arriving[a]]
+            elif coming >= 0:
                 a += 1
-                if read < start[e + 1] and order[read] == i:
-                    read += 1  # it left and came back within the search
-                held[n_new] = i
+                if read < start[e + 1] and order[read] == coming:
+                    read += 1  # it left and came back
+                held[n_new] = coming
                 n_new += 1
             else:
                 break
         ends[t] = n_new
-    # what lies between them, and the elements that are occupied from now on or no more
-    ranges, shift = np.empty((n_touched, 3), np.int64), 0
-    places, n_places, change = np.empty((n_touched, 3), np.int64), 0, 0
-    entering = np.empty(n_touched, np.int64)
+    # what lies between them moves
+    ranges, shift, first_changed = np.empty((n_touched, 3), np.int64), 0, n_elements
     for t in range(n_touched):
         e = touched[t]
         count, before = ends[t] - (ends[t - 1] if t > 0 else 0), start[e + 1] - start[e]
@@ -184,18 +214,8 @@ def update_order(
         ranges[t, 0], ranges[t, 2] = start[e + 1], shift
         ranges[t, 1] = start[touched[t + 1]] if t + 1 < n_touched else start[n_elements]
         if (count > 0) != (before > 0):
-            place = place_of(e, occupied, 0, n_occupied)
-            if n_places > 0:
-                places[n_places - 1, 1] = place
-            change += 1 if count > 0 else -1
-            places[n_places, 0], places[n_places, 1], places[n_places, 2] = place + (before > 0), n_occupied, change
-            entering[n_places] = e if count > 0 else -1
-            n_places += 1
-    shift_ranges(order, spare_order, ranges, n_touched)
-    shift_ranges(occupied, spare_start, places, n_places)
-    for k in range(n_places):
-        if entering[k] >= 0:
-            occupied[places[k, 0] + places[k, 2] - 1] = entering[k]
+            first_changed = min(first_changed, e)
+    shift_ranges(order, spare, ranges, n_touched)
     k = 0
     for t in range(n_touched):
         e = touched[t]
@@ -207,4 +227,10 @@ def update_order(
         if ranges[t, 2] != 0:
             for f in range(e + 1, last + 1):
                 start[index(f)] += ranges[t, 2]
-    return n_occupied + change, start[n_elements]
+    if first_changed < n_elements:
+        n_occupied = place_of(first_changed, occupied, 0, n_occupied)
+        for e in range(first_changed, n_elements):
+            if start[e + 1] > start[e]:
+                occupied[n_occupied] = e
+                n_occupied += 1
+    return n_occupied, start[n_elements]

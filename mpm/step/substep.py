@@ -8,10 +8,9 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
-from mpm.machine.compile import allocating_part, kernel, kernel_part
-from mpm.machine.team import Team, shared
+from mpm.machine.compile import inline_kernel, kernel_part, step_kernel
+from mpm.machine.team import shared
 from mpm.pace.clock import ALMOST_ALL, END, NOW, SMALLEST, SPAN, plan_step
 from mpm.step.find import follow_points, locate_kernel, total
 from mpm.step.nodes import remap_kernel, solve_kernel
@@ -19,13 +18,9 @@ from mpm.step.nodes_to_points import advance_kernel
 from mpm.step.points_to_nodes import update_kernel
 from mpm.step.sort import cut_by_work
 
-#: Of the process, in microseconds (POSIX).
-processor_time = types.ExternalFunction("clock", types.int64())
 #: Passes of a substep, in their order, after one that plans the long step. A range of them may be run alone.
-PASSES = (
-    "plan_step", "solve_nodes", "advance_points", "remap_nodes", "update_points", "locate", "follow_points",
-)  # fmt: skip
-(PLAN, SOLVE, ADVANCE, REMAP, UPDATE, LOCATE, FOLLOW) = range(len(PASSES))
+PASSES = ("plan_step", "solve_nodes", "advance_points", "remap_nodes", "update_points")
+(PLAN, SOLVE, ADVANCE, REMAP, UPDATE) = range(len(PASSES))
 #: What the passes count, beside the arrays: places in `Tally.counts` of `mpm.step.system`.
 (OCCUPIED, ACTIVE, SUSPENDED, SUBSTEPS, POINT_STEPS) = range(5)
 #: And in `Tally.measures`: the largest time step over the critical one it led to, mass of the points taken out.
@@ -54,17 +49,6 @@ def all_good(bad):
 
 
 @kernel_part
-def lap(team, system, which):
-    """Add the processor time since the last look to that of a pass, where it is measured; -1: only look."""
-    if system.tally.used.size == 0 or team.thread > 0:
-        return
-    now = processor_time()
-    if which >= 0:
-        system.tally.used[which] += now - team.at[1]
-    team.at[1] = now
-
-
-@kernel_part
 def points_before(ground, element_cuts, cuts, finished, part):
     """Number of points that the parts before a part hold in the levels up to `finished`."""
     count = 0
@@ -77,7 +61,7 @@ def points_before(ground, element_cuts, cuts, finished, part):
     return count
 
 
-@allocating_part
+@inline_kernel
 def follow(system, finished):
     """Note what the update of a substep found, and repair the list of points."""
     ground, tally, layout = system.ground, system.tally, system.net.layout
@@ -96,14 +80,14 @@ def follow(system, finished):
         cut_by_work(ground.start, ground.occupied, counts[OCCUPIED], layout, finished + 1, system.cuts)
 
 
-@allocating_part
+@inline_kernel
 def finish(system):
     """The end of a long step."""
     follow(system, system.net.layout.element_cuts.size - 2)
     system.clock.times[NOW] += system.clock.times[SPAN]
 
 
-@allocating_part
+@inline_kernel
 def plan(number, batch, system):
     """Begin a long step, if there shall be one more."""
     ground, net, cuts, counts, times = system.ground, system.net, system.cuts, system.tally.counts, system.clock.times
@@ -127,7 +111,7 @@ def long_step_kernel(needs):
     solve_nodes, advance_points, remap_nodes = solve_kernel(needs), advance_kernel(needs), remap_kernel(needs)
     update_points, locate = update_kernel(needs), locate_kernel(needs)
 
-    @kernel_part
+    @inline_kernel
     def update(team, part, finished, advance, system):
         """`update_points` and `locate` of all levels of a part."""
         tally, cuts = system.tally, system.cuts.elements
@@ -145,14 +129,13 @@ def long_step_kernel(needs):
         tally.first_left[part], tally.n_left[part] = base, moved
         tally.suspended[part], tally.bad[part] = suspended, bad
         tally.limits[part, 0], tally.limits[part, 1] = limit, limit_speed
-        lap(team, system, UPDATE)
         if bad < 0:
             parts = system.net.sums.shape[0]
             tally.limits[parts + part, 0], tally.limits[parts + part, 1] = locate(
                 tally.left[base:], moved, tally.origin[base:], part, finished, system
             )
 
-    @kernel_part
+    @inline_kernel
     def substep(team, k, first_pass, last_pass, advance, system):
         """A range of passes of substep `k` of the long step; False where a point went bad.
 
@@ -161,61 +144,45 @@ def long_step_kernel(needs):
         """
         parts, cuts = system.net.sums.shape[0], system.cuts
         begun, finished = system.clock.begun, system.clock.finished
-        lap(team, system, -1)
         if first_pass <= SOLVE:
             # the list of points after the substep before is not needed by the nodes: one part more
-            behind = 1 if k > 0 and last_pass == FOLLOW else 0
+            behind = 1 if k > 0 and last_pass == UPDATE else 0
             for part in shared(team, parts + behind):
                 if part == parts:
                     follow(system, finished[k - 1])
-                    lap(team, system, FOLLOW)
                     continue
                 for level in range(begun[k] + 1):
                     solve_nodes(cuts.solved[level, part], cuts.solved[level, part + 1], part, begun[k], system)
-                lap(team, system, SOLVE)
-            lap(team, system, SOLVE)
         if first_pass <= ADVANCE <= last_pass:
             for part in shared(team, parts):
                 for level in range(finished[k] + 1):
                     advance_points(cuts.elements[level, part], cuts.elements[level, part + 1], part, system)
-            lap(team, system, ADVANCE)
         if first_pass <= REMAP <= last_pass:
             for part in shared(team, parts):
                 for level in range(finished[k] + 1):
                     remap_nodes(cuts.nodes[level, part], cuts.nodes[level, part + 1], finished[k], system)
-            lap(team, system, REMAP)
-        if UPDATE <= last_pass:
+        if last_pass == UPDATE:
             for part in shared(team, parts):
                 update(team, part, finished[k], advance, system)
-                lap(team, system, LOCATE)
-            lap(team, system, UPDATE)
             return all_good(system.tally.bad)
         return True
 
-    @kernel
-    def long_step(thread, meeting, stage, first_pass, last_pass, advance, batch, system):
+    @step_kernel
+    def long_step(team, first_pass, last_pass, advance, batch, system):
         """Do what other threads leave of a range of passes of all substeps; `advance` False maps the points only."""
-        team = Team(thread, meeting, np.array([stage, 0]))
         for number in range(batch.substeps.size):
-            lap(team, system, -1)
-            if first_pass == PLAN:
+            if number > 0 or first_pass == PLAN:
                 for _ in shared(team, 1):
                     if number > 0:
                         finish(system)
-                        lap(team, system, FOLLOW)
-                    plan(number, batch, system)
-                lap(team, system, PLAN)
+                    if first_pass == PLAN:
+                        plan(number, batch, system)
             if last_pass == PLAN:
                 return
             for k in range(batch.substeps[number]):
                 if not substep(team, k, first_pass, last_pass, advance, system):
                     return
-            if batch.substeps[number] == 0 or last_pass < FOLLOW:
+            if batch.substeps[number] == 0 or last_pass < UPDATE:
                 return
-        # the last one of those that were not planned here
-        lap(team, system, -1)
-        for _ in shared(team, 1):
-            finish(system)
-        lap(team, system, FOLLOW)
 
     return long_step

@@ -104,9 +104,7 @@ class Tally(NamedTuple):
     ledger: np.ndarray  # (n_parts,) records
     left: np.ndarray  # (n_points,) points that left their element
     origin: np.ndarray  # (n_points,) that element
-    spare_start: np.ndarray
-    spare_order: np.ndarray
-    used: np.ndarray  # (n_passes,) processor time of each pass [microseconds], or empty: not measured
+    spare: np.ndarray  # (n_points,) int32, for copies of `order`
 
 
 class System(NamedTuple):

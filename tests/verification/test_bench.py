@@ -10,7 +10,8 @@ import pytest
 import mpm
 from verification.small_event import small_scene
 from verification.speed.command import bench, bytes_per_point_step
-from verification.speed.stepping import configurations, kernel_times, prepared, slope
+from verification.speed.passes import kernel_times, stages
+from verification.speed.stepping import configurations, prepared, slope, steps
 
 pytestmark = pytest.mark.slow
 
@@ -24,9 +25,27 @@ def solver():
 def test_kernel_times_add_up_to_the_step_and_leave_the_solver_as_it_was(solver):
     attributes = set(vars(solver))
     kernels = kernel_times(solver, 0.2)
-    assert set(vars(solver)) == attributes
+    assert set(vars(solver)) == attributes and "together" not in vars(solver.workers)
     assert {"update_points", "advance_points", "solve_nodes", "remap_nodes", "python"} <= set(kernels)
     assert all(spent > 0 for spent in kernels.values())
+
+
+def test_stages_of_long_steps_are_those_that_the_kernel_goes_through(solver):
+    counted, together = [], solver.workers.together
+
+    def counting(kernel, *arguments):
+        before, others = int(solver.workers._meeting[-16]), together(kernel, *arguments)
+        if kernel is solver._long_step:
+            named = sum(parts for _, parts in stages(arguments[3].substeps, solver.parts))
+            counted.append((int(solver.workers._meeting[-16]) - before, named))
+        return others
+
+    solver.workers.together = counting
+    try:
+        steps(solver)
+    finally:
+        del solver.workers.together
+    assert counted and all(done == named for done, named in counted)
 
 
 def test_bytes_of_a_point_are_two_passes_over_its_row_order_and_soil(solver):

@@ -7,13 +7,13 @@ import numpy as np
 
 from mpm.solver import cores
 from verification.speed import processes
+from verification.speed.passes import kernel_times
 from verification.speed.reference import ReferenceLoop, copy_bandwidth
 from verification.speed.stepping import (
     LARGEST,
     SECONDS_OF_WARM_UP,
     SIZES,
     configurations,
-    kernel_times,
     prepared,
     rate,
     size_ladder,

@@ -7,15 +7,12 @@ import numpy as np
 
 import mpm
 from mpm.simulation import STEPS_BETWEEN_CHECKS
-from mpm.step.substep import PASSES
 from verification.boxes import box_mesh
 
 SECONDS_OF_WARM_UP = 0.5
 ROUNDS = 3  # the best counts: other programs slow one down, and in few steps of many points a spectrum may fall or not
 SIZES = (1e3, 1e4, 1e5, 1e6)
 LARGEST = 3e6
-#: Methods of the solver that a step calls only now and then, and what they are called in the table.
-OCCASIONAL = {"_sort_physically": "sorting", "_update_wave_speed": "spectrum"}
 
 
 FULL, CROWN, TIGHT = "full", "gate at the crown, whole", "k = 1e-12 m/s"
@@ -91,39 +88,6 @@ def rate(solver, seconds):
     _, used, wall = timed(lambda: steps(solver), seconds)
     done = solver.point_steps - points
     return done / used, done / wall, (solver.time - time) / used
-
-
-def kernel_times(solver, seconds):
-    """Processor time of each pass per point-step [s], the rest of a step as "python", of a solver on one thread."""
-    occasional = dict.fromkeys(OCCASIONAL.values(), 0.0)
-    inner = [0.0]
-
-    def measured(function, name):
-        def call():
-            inner.append(0.0)
-            begin = clock.process_time()
-            function()
-            spent = clock.process_time() - begin
-            occasional[name] += spent - inner.pop()
-            inner[-1] += spent
-
-        return call
-
-    for method, name in OCCASIONAL.items():
-        setattr(solver, method, measured(getattr(solver, method), name))
-    solver._used = np.zeros(len(PASSES), np.int64)
-    points = solver.point_steps
-    try:
-        _, total, _ = timed(lambda: steps(solver), seconds)
-    finally:
-        passes, solver._used = solver._used, solver._used[:0]
-        for method in OCCASIONAL:
-            delattr(solver, method)
-    used = {name: 1e-6 * int(spent) for name, spent in zip(PASSES, passes, strict=True)}
-    used |= {name: spent for name, spent in occasional.items() if spent > 0}
-    used["python"] = total - sum(used.values())
-    done = solver.point_steps - points
-    return {name: spent / done for name, spent in sorted(used.items(), key=lambda item: -item[1])}
 
 
 def size_ladder(scene, sizes, seconds):

@@ -18,7 +18,7 @@ from mpm.fields import block, numbers
 from mpm.pace.spectrum import Spectrum, spectral_time_step
 from mpm.scene import Numerics
 from mpm.solver import Solver
-from mpm.step.substep import ADVANCE, FOLLOW, PLAN, REMAP, SOLVE
+from mpm.step.substep import ADVANCE, PLAN, REMAP, SOLVE, UPDATE
 from verification.boxes import box_mesh, box_scene, hat_functions, place, put, state
 
 DEFAULT = Numerics()
@@ -96,7 +96,7 @@ class SteppedAt(Solver):
 
     def _advance(self, batch):
         self._run(PLAN, PLAN, batch)
-        self._run(REMAP, FOLLOW)
+        self._run(REMAP, UPDATE)
         self._run(SOLVE, ADVANCE)
 
 
