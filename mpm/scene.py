@@ -261,6 +261,27 @@ class Scene(Part):
 
     @model_validator(mode="after")
     def _check(self):
+        self._check_soils()
+        self._check_water()
+        for k, tunnel in enumerate(self.tunnels):
+            self._check_lining(k, tunnel)
+            self._check_place(k, tunnel)
+        if self.gate is not None:
+            self._check_gate(self.gate)
+        if self.symmetry == "half" and self.asymmetry is not None:
+            raise ValueError(
+                f"symmetry: 'half' must mirror the scene in x = 0, got {self.asymmetry}; write symmetry = 'auto'"
+            )
+        self._check_length()
+        needed, available = self.estimated_bytes, _physical_memory()
+        if needed > available:
+            raise ValueError(
+                f"discretisation: must fit in memory ({available / 1e9:.3g} GB), got about {needed / 1e9:.3g} GB for "
+                f"{self.estimated_elements:.2g} elements; raise element_size, element_size_lining or size_growth"
+            )
+        return self
+
+    def _check_soils(self):
         tops = [soil.top_depth for soil in self.soils]
         if tops[0] != 0 or any(b <= a for a, b in pairwise(tops)):
             raise ValueError(f"soils: top_depth must start at 0 and increase, got {tops}; list the layers downward")
@@ -277,6 +298,8 @@ class Scene(Part):
                     f"soil '{unknown[0]}': hydraulic_conductivity must be given where there is water, got none; give "
                     "the Darcy conductivity in m/s, sand about 1e-4, or leave [water] out for a dry scene"
                 )
+
+    def _check_water(self):
         moving = [k for k, tunnel in enumerate(self.tunnels) if self.lining_of(tunnel) != "fixed"]
         if self.is_undrained and moving:
             raise ValueError(
@@ -289,45 +312,43 @@ class Scene(Part):
                 f"water: table_depth {self.water.table_depth:g} m must lie in the box of depth {self.box.depth:g} m; "
                 "leave [water] out for a dry scene"
             )
+
+    def _check_place(self, k, t):
         size = self.discretisation.element_size
-        for k, t in enumerate(self.tunnels):
-            self._check_lining(k, t)
-            sides = (
-                self.box.width / 2 - abs(t.x) - t.outer_radius,
-                self.box.depth - t.axis_depth - t.outer_radius,
+        sides = (
+            self.box.width / 2 - abs(t.x) - t.outer_radius,
+            self.box.depth - t.axis_depth - t.outer_radius,
+        )
+        if min(sides) < size:
+            raise ValueError(
+                f"tunnel {k}: outside the box or closer to its edge than one element: it spans x = "
+                f"{t.x - t.outer_radius:g} .. {t.x + t.outer_radius:g} m and reaches depth "
+                f"{t.axis_depth + t.outer_radius:g} m in a box of width {self.box.width:g} m and depth "
+                f"{self.box.depth:g} m; move the tunnel or enlarge the box"
             )
-            if min(sides) < size:
+        for j, other in enumerate(self.tunnels[:k]):
+            gap = math.hypot(t.x - other.x, t.axis_depth - other.axis_depth) - t.outer_radius - other.outer_radius
+            if gap <= 0:
                 raise ValueError(
-                    f"tunnel {k}: outside the box or closer to its edge than one element: it spans x = "
-                    f"{t.x - t.outer_radius:g} .. {t.x + t.outer_radius:g} m and reaches depth "
-                    f"{t.axis_depth + t.outer_radius:g} m in a box of width {self.box.width:g} m and depth "
-                    f"{self.box.depth:g} m; move the tunnel or enlarge the box"
+                    f"tunnels: {j} and {k} must lie apart, got an overlap by {-gap:g} m; increase the axis spacing"
                 )
-            for j, other in enumerate(self.tunnels[:k]):
-                gap = math.hypot(t.x - other.x, t.axis_depth - other.axis_depth) - t.outer_radius - other.outer_radius
-                if gap <= 0:
-                    raise ValueError(
-                        f"tunnels: {j} and {k} must lie apart, got an overlap by {-gap:g} m; increase the axis spacing"
-                    )
-        if self.gate is not None:
-            if self.gate.tunnel >= len(self.tunnels):
-                raise ValueError(
-                    f"gate: tunnel {self.gate.tunnel} must be one of the {len(self.tunnels)}, counted from 0; "
-                    "give its number"
-                )
-            t = self.tunnels[self.gate.tunnel]
-            if self.gate.width > 0.5 * t.inner_radius:
-                raise ValueError(
-                    f"gate: width {self.gate.width:g} m is wider than a segment can lose: at most a quarter of the "
-                    f"inner diameter, {0.5 * t.inner_radius:g} m; check the unit (metres)"
-                )
-        elif self.stop.inflow_mass is not None and self.stop.time is None:
+
+    def _check_gate(self, gate):
+        if gate.tunnel >= len(self.tunnels):
+            raise ValueError(
+                f"gate: tunnel {gate.tunnel} must be one of the {len(self.tunnels)}, counted from 0; give its number"
+            )
+        t = self.tunnels[gate.tunnel]
+        if gate.width > 0.5 * t.inner_radius:
+            raise ValueError(
+                f"gate: width {gate.width:g} m is wider than a segment can lose: at most a quarter of the "
+                f"inner diameter, {0.5 * t.inner_radius:g} m; check the unit (metres)"
+            )
+
+    def _check_length(self):
+        if self.gate is None and self.stop.inflow_mass is not None and self.stop.time is None:
             raise ValueError(
                 "stop: must have a time, got inflow_mass alone, never reached without a gate; give stop.time or a gate"
-            )
-        if self.symmetry == "half" and self.asymmetry is not None:
-            raise ValueError(
-                f"symmetry: 'half' must mirror the scene in x = 0, got {self.asymmetry}; write symmetry = 'auto'"
             )
         if self.stop.time is None and self.gravity == 0:
             raise ValueError("stop: inflow_mass is never reached without gravity, got 0; give stop.time")
@@ -337,13 +358,6 @@ class Scene(Part):
                 f"output: interval must give at most {MOST_RECORDS:.0e} records in {longest:g} s, got "
                 f"{self.output.interval:g} s; give e.g. {longest / 1000:g}"
             )
-        needed, available = self.estimated_bytes, _physical_memory()
-        if needed > available:
-            raise ValueError(
-                f"discretisation: must fit in memory ({available / 1e9:.3g} GB), got about {needed / 1e9:.3g} GB for "
-                f"{self.estimated_elements:.2g} elements; raise element_size, element_size_lining or size_growth"
-            )
-        return self
 
     def vertical_stress(self, depth: float) -> float:
         """Vertical effective stress of the level ground at a depth [m], compression positive [Pa].

@@ -22,7 +22,7 @@ class Strain(NamedTuple):
     expansion: float  # xx + yy
     expansion_liquid: float  # of the pore water
     shrunk: float  # 1 / (1 + expansion)
-    equivalent: float  # deviatoric, sqrt(2/3 e:e)
+    equivalent: float  # deviatoric, sqrt(2/3 e:e); 0 while the initial state settles: strain counts from then on
 
 
 def elastic_trial(stress, strain, lame, shear):

@@ -215,9 +215,8 @@ def product(u, v, first, last):
 
 
 @cache
-def krylov_kernel(needs):
-    """Kernel `build_krylov` for what a scene needs."""
-    width, gather = 4 if needs.two_phase else 2, gather_kernel(needs)
+def apply_kernel(width):
+    """Kernel `apply` for velocities of so many numbers: two, or four with those of the water."""
 
     @kernel_part
     def through_points(k, e, o, returned):
@@ -252,6 +251,15 @@ def krylov_kernel(needs):
                     mass = o.nodal[i].solid if x < 2 else o.nodal[i].liquid
                     total = take(o.at_nodes, i, x)
                     image[i, x] = -total / mass if o.free[i, x % 2] else 0.0
+
+    return apply
+
+
+@cache
+def krylov_kernel(needs):
+    """Kernel `build_krylov` for what a scene needs."""
+    width, gather = 4 if needs.two_phase else 2, gather_kernel(needs)
+    apply = apply_kernel(width)
 
     @inline_kernel
     def orthogonalise(team, o, j, flat, hessenberg):

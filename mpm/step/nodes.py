@@ -132,11 +132,10 @@ def clear_mean(mean):
 
 
 @cache
-def solve_kernel(needs):
-    """Kernel `solve_nodes` for what a scene needs (`mpm.step.system.Needs`)."""
-    wet, two_phase, moving, tied = needs.wet, needs.two_phase, needs.moving, needs.tied
-    undrained = wet and not two_phase
-    sum_of_node, without_reactions, at_wall = sum_kernel(needs), free_kernel(needs), contact_kernel(needs)
+def wall_kernel(needs):
+    """Kernel `velocity_at_wall` for what a scene needs."""
+    two_phase, moving, at_wall = needs.two_phase, needs.moving, contact_kernel(needs)
+    undrained = needs.wet and not two_phase
 
     @kernel_part
     def velocity_at_wall(i, c, b, m, u, force, dt, walls, ledger, system):
@@ -166,6 +165,13 @@ def solve_kernel(needs):
         ledger.reactions += push
         return shifted(v, x, y) if moving else v
 
+    return velocity_at_wall
+
+
+@cache
+def set_kernel(two_phase):
+    """Kernel `set_velocity` for one velocity or two."""
+
     @inline_kernel
     def set_velocity(node, v, ux, uy, wx, wy):
         """The velocities of a node at the end of its step, and what they changed by from u, w."""
@@ -176,6 +182,15 @@ def solve_kernel(needs):
             node.velocity_liquid_x, node.velocity_liquid_y = v.liquid_x, v.liquid_y
             node.change_liquid_x += v.liquid_x - wx
             node.change_liquid_y += v.liquid_y - wy
+
+    return set_velocity
+
+
+@cache
+def follow_kernel(needs):
+    """Kernel `follow_node` for what a scene needs."""
+    two_phase, set_velocity = needs.two_phase, set_kernel(needs.two_phase)
+    undrained = needs.wet and not two_phase
 
     @kernel_part
     def follow_node(i, v, u, dt, begun, net, dt_of_level):
@@ -199,6 +214,13 @@ def solve_kernel(needs):
                     row.momentum_liquid_x += row.mass_liquid * (v.liquid_x - u.liquid_x)
                     row.momentum_liquid_y += row.mass_liquid * (v.liquid_y - u.liquid_y)
             r = net.next_row[r]
+
+    return follow_node
+
+
+@cache
+def book_kernel(two_phase):
+    """Kernel `book` for one velocity or two."""
 
     @kernel_part
     def book(m, v, u, force, dt, gravity, ledger):
@@ -225,6 +247,16 @@ def solve_kernel(needs):
         ledger.kinetic += kinetic
         ledger.gravity -= dt * gravity * weight
         ledger.stress += dt * work
+
+    return book
+
+
+@cache
+def solve_kernel(needs):
+    """Kernel `solve_nodes` for what a scene needs (`mpm.step.system.Needs`)."""
+    two_phase, tied = needs.two_phase, needs.tied
+    sum_of_node, without_reactions, velocity_at_wall = sum_kernel(needs), free_kernel(needs), wall_kernel(needs)
+    set_velocity, follow_node, book = set_kernel(two_phase), follow_kernel(needs), book_kernel(two_phase)
 
     @kernel_part
     def solve_node(i, begun, ledger, system):
@@ -283,9 +315,34 @@ def constrained(v, fixed):
 
 
 @cache
+def held_kernel(two_phase):
+    """Kernel `held_at_wall` for one velocity or two."""
+
+    @kernel_part
+    def held_at_wall(v, status, contact):
+        """Velocities seen from a wall, under the constraints that acted in this step."""
+        sx, sy, lx, ly = v
+        if status & SOLID_STICKS:
+            sx = sy = 0.0
+        else:
+            vn = contact.normal_x * sx + contact.normal_y * sy
+            if status & SOLID_HELD or vn < 0.0:
+                sx -= vn * contact.normal_x
+                sy -= vn * contact.normal_y
+        if two_phase:
+            vn = contact.normal_x * lx + contact.normal_y * ly
+            if status & LIQUID_HELD or vn < 0.0:
+                lx -= vn * contact.normal_x
+                ly -= vn * contact.normal_y
+        return Pair(sx, sy, lx, ly)
+
+    return held_at_wall
+
+
+@cache
 def remap_kernel(needs):
     """Kernel `remap_nodes` for what a scene needs (`mpm.step.system.Needs`)."""
-    two_phase, moving, tied = needs.two_phase, needs.moving, needs.tied
+    two_phase, moving, tied, held_at_wall = needs.two_phase, needs.moving, needs.tied, held_kernel(needs.two_phase)
 
     @kernel_part
     def new_momentum(i, finished, net):
@@ -315,24 +372,6 @@ def remap_kernel(needs):
                         lx += row.momentum_liquid_x
                         ly += row.momentum_liquid_y
             r = net.next_row[r]
-        return Pair(sx, sy, lx, ly)
-
-    @kernel_part
-    def held_at_wall(v, status, contact):
-        """Velocities seen from a wall, under the constraints that acted in this step."""
-        sx, sy, lx, ly = v
-        if status & SOLID_STICKS:
-            sx = sy = 0.0
-        else:
-            vn = contact.normal_x * sx + contact.normal_y * sy
-            if status & SOLID_HELD or vn < 0.0:
-                sx -= vn * contact.normal_x
-                sy -= vn * contact.normal_y
-        if two_phase:
-            vn = contact.normal_x * lx + contact.normal_y * ly
-            if status & LIQUID_HELD or vn < 0.0:
-                lx -= vn * contact.normal_x
-                ly -= vn * contact.normal_y
         return Pair(sx, sy, lx, ly)
 
     @kernel_part

@@ -49,10 +49,8 @@ def add_momentum(row, share, px, py, qx, qy, two_phase):
 
 
 @cache
-def advance_kernel(needs):
-    """Kernel `advance_points` for what a scene needs (`mpm.step.system.Needs`)."""
-    wet, two_phase, tied = needs.wet, needs.two_phase, needs.tied
-    undrained = wet and not two_phase
+def flip_kernel(two_phase):
+    """Kernel `new_velocities` for one velocity or two."""
 
     @inline_kernel
     def new_velocities(point, n0, n1, n2, a, b, c, flip):
@@ -71,6 +69,15 @@ def advance_kernel(needs):
             uy = point.velocity_liquid_y + n0 * a.change_liquid_y + n1 * b.change_liquid_y + n2 * c.change_liquid_y
             ux, uy = flip * ux + pic * hx, flip * uy + pic * hy
         return gx, gy, vx, vy, ux, uy
+
+    return new_velocities
+
+
+@cache
+def advance_kernel(needs):
+    """Kernel `advance_points` for what a scene needs (`mpm.step.system.Needs`)."""
+    wet, two_phase, tied, new_velocities = needs.wet, needs.two_phase, needs.tied, flip_kernel(needs.two_phase)
+    undrained = wet and not two_phase
 
     @kernel_part
     def advance_element(e, momenta, system):

@@ -237,11 +237,9 @@ def with_point(push, volume, point, p):
 
 
 @cache
-def update_kernel(needs):
-    """Kernel `update_points` for what a scene needs (`mpm.step.system.Needs`)."""
-    wet = needs.wet
-    strain_of_element, advance_state = strain_kernel(needs), state_kernel(needs)
-    add_point, add_forces = point_kernel(needs), force_kernel(needs.wet)
+def push_kernel(wet):
+    """Kernel `push_nodes` for soil with pore water or without."""
+    add_forces = force_kernel(wet)
 
     @kernel_part
     def push_nodes(e, push, before, runs_ahead, own, system):
@@ -260,6 +258,16 @@ def update_kernel(needs):
                 touched[a] = touched[b] = touched[c] = 1
                 area = 0.5 * net.geometry[beside].area / shape.area
                 add_forces(net.geometry[beside], scaled(push, area), sums[a], sums[b], sums[c])
+
+    return push_nodes
+
+
+@cache
+def element_kernel(needs):
+    """Kernel `update_element` for what a scene needs."""
+    wet = needs.wet
+    strain_of_element, advance_state = strain_kernel(needs), state_kernel(needs)
+    add_point, push_nodes = point_kernel(needs), push_kernel(needs.wet)
 
     @kernel_part
     def update_element(e, left, moved, advance, own, system):
@@ -309,6 +317,14 @@ def update_kernel(needs):
         clamps.suspended += suspended
         push_nodes(e, push, before, runs_ahead, own, system)
         return moved, bad, suspended, np.sqrt(fastest)
+
+    return update_element
+
+
+@cache
+def update_kernel(needs):
+    """Kernel `update_points` for what a scene needs (`mpm.step.system.Needs`)."""
+    update_element = element_kernel(needs)
 
     @inline_kernel
     def update_points(first, last, own, left, advance, system):

@@ -149,6 +149,32 @@ def unpair(key):
     return key >> 32, key & 0xFFFFFFFF
 
 
+@kernel_part
+def list_touched(element_of_point, moved, n_moved, touched, arriving):
+    """Elements that points have left or reached, and :func:`pair` of element and point for those that arrive.
+
+    touched, arriving : (2 n_moved,), (n_moved,) int64
+        Written: ascending; an element once.
+    Returns the number of both.
+    """
+    n_listed, n_arriving = 0, 0
+    for k in range(n_moved):
+        i, touched[n_listed] = unpair(moved[k])
+        n_listed += 1
+        goal = element_of_point[i]
+        if goal >= 0:
+            touched[n_listed], arriving[n_arriving] = goal, pair(goal, i)
+            n_listed, n_arriving = n_listed + 1, n_arriving + 1
+    ascend(touched, n_listed)
+    ascend(arriving, n_arriving)
+    n_touched = 0
+    for k in range(n_listed):
+        if n_touched == 0 or touched[k] != touched[n_touched - 1]:
+            touched[n_touched] = touched[k]
+            n_touched += 1
+    return n_touched, n_arriving
+
+
 @integer_kernel
 def update_order(element_of_point, moved, n_moved, start, order, occupied, n_occupied, spare):
     """Repair the sorting by element in place after a few points have moved, shifting what lies between their elements.
@@ -162,26 +188,13 @@ def update_order(element_of_point, moved, n_moved, start, order, occupied, n_occ
     Returns the number of occupied elements and of points.
     """
     n_elements = start.size - 1
-    touched, n_listed = np.empty(2 * n_moved, np.int64), 0
-    arriving, n_arriving = np.empty(n_moved, np.int64), 0
-    for k in range(n_moved):
-        i, touched[n_listed] = unpair(moved[k])
-        n_listed += 1
-        goal = element_of_point[i]
-        if goal >= 0:
-            touched[n_listed], arriving[n_arriving] = goal, pair(goal, i)
-            n_listed, n_arriving = n_listed + 1, n_arriving + 1
-    ascend(touched, n_listed)
-    ascend(arriving, n_arriving)
-    n_touched, n_held = 0, 0
-    for k in range(n_listed):
-        e = touched[k]
-        if n_touched == 0 or e != touched[n_touched - 1]:
-            touched[n_touched] = e
-            n_touched += 1
-            n_held += start[e + 1] - start[e]
+    touched, arriving = np.empty(2 * n_moved, np.int64), np.empty(n_moved, np.int64)
+    n_touched, n_arriving = list_touched(element_of_point, moved, n_moved, touched, arriving)
+    n_held = n_arriving
+    for t in range(n_touched):
+        n_held += start[touched[t] + 1] - start[touched[t]]
     # the new lists of these elements, one after the other
-    held, ends, n_new, a = np.empty(n_held + n_arriving, np.int32), np.empty(n_touched, np.int64), 0, 0
+    held, ends, n_new, a = np.empty(n_held, np.int32), np.empty(n_touched, np.int64), 0, 0
     for t in range(n_touched):
         e = touched[t]
         read = start[e]

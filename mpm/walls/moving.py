@@ -104,9 +104,46 @@ def solve_dense(matrix, right):
 
 
 @cache
+def node_kernel(wet):
+    """Kernel `add_node` for soil with pore water or without."""
+    react = reaction_kernel(wet)
+
+    @kernel_part
+    def add_node(node, c, g, contact, velocity, wall, along, across, matrix, residual, scale):
+        """Add the reaction of a node to the ring's balance, its derivatives and its size; set the wall's velocity.
+
+        node : record of `gather`;  c : row of `contact` and `wall`;  g : (2, m) float64 of `motion`
+        along, across : (m,) float64, scratch.
+        """
+        m = velocity.size
+        ux = uy = 0.0
+        for j in range(m):
+            ux += g[0, j] * velocity[j]
+            uy += g[1, j] * velocity[j]
+        wall[c, 0], wall[c, 1] = ux, uy
+        if contact[c].active <= 0.0 or node.solid <= 0.0:
+            return
+        nx, ny = contact[c].normal_x, contact[c].normal_y
+        push, shear, push_n, shear_n, shear_t = react(node, contact[c], ux, uy)
+        if push == 0.0:
+            return
+        for j in range(m):
+            along[j], across[j] = nx * g[0, j] + ny * g[1, j], ny * g[0, j] - nx * g[1, j]
+        for i in range(m):
+            felt = along[i] * push + across[i] * shear
+            residual[i] += felt
+            scale[i] += abs(felt)
+            by_n, by_t = along[i] * push_n + across[i] * shear_n, across[i] * shear_t
+            for j in range(m):
+                matrix[i, j] += by_n * along[j] + by_t * across[j]
+
+    return add_node
+
+
+@cache
 def velocity_kernel(wet):
     """Kernel `find_velocity` for soil with pore water or without."""
-    react = reaction_kernel(wet)
+    add_node = node_kernel(wet)
 
     @kernel
     def find_velocity(state, rows, motion, contact, effective_mass, due, velocity, left, wall):
@@ -146,28 +183,7 @@ def velocity_kernel(wet):
                     residual[i] += moved
                     scale[i] += abs(moved)
             for k in range(rows.size):
-                c = rows[k]
-                g = motion[k]
-                ux = uy = 0.0
-                for j in range(m):
-                    ux += g[0, j] * velocity[j]
-                    uy += g[1, j] * velocity[j]
-                wall[c, 0], wall[c, 1] = ux, uy
-                if contact[c].active <= 0.0 or state[k].solid <= 0.0:
-                    continue
-                nx, ny = contact[c].normal_x, contact[c].normal_y
-                push, shear, push_n, shear_n, shear_t = react(state[k], contact[c], ux, uy)
-                if push == 0.0:
-                    continue
-                for j in range(m):
-                    along[j], across[j] = nx * g[0, j] + ny * g[1, j], ny * g[0, j] - nx * g[1, j]
-                for i in range(m):
-                    felt = along[i] * push + across[i] * shear
-                    residual[i] += felt
-                    scale[i] += abs(felt)
-                    by_n, by_t = along[i] * push_n + across[i] * shear_n, across[i] * shear_t
-                    for j in range(m):
-                        matrix[i, j] += by_n * along[j] + by_t * across[j]
+                add_node(state[k], rows[k], motion[k], contact, velocity, wall, along, across, matrix, residual, scale)
             error = size = 0.0
             for i in range(m):
                 size += residual[i] ** 2
