@@ -138,45 +138,6 @@ def forces(folder):
         yield mass, *cells, " ".join(f"{v * 1e3:.2f}" for v in now["joint_rotation"].values)
 
 
-def beside_the_study(folder):
-    """Statements of the published study with our numbers: rows of (what, theirs, ours).
-
-    Source: Xie, Zhang & Zhou, Table 3 and their text on case 3; permeability and joint angles are not published.
-    """
-    response, pressures, history = read_response(folder), read_pressures(folder), read_history(folder)
-    first, now = response.isel(time=0), postprocess.at_inflow(response, 1000)
-
-    def change(name, pick):
-        before, after = (float(getattr(state[name], pick)()) for state in (first, now))
-        return f"{100 * (after / before - 1):+.0f} % ({before / 1e3:.0f} to {after / 1e3:.0f})"
-
-    def joints(name, scale=1e3):
-        return " ".join(f"{float(v) / scale:.0f}" for v in first[name].values)
-
-    invert = float(first["bending_moment"].sel(theta=180, method="nearest")) / 1e3
-    rate, _ = postprocess.inflow_linearity(history, 100, 1000)
-    rise = [100 * (postprocess.ratio_to_initial(pressures, "soil_pressure", 1000, [a]) - 1) for a in (0, 180)]
-    worst = [int(np.argsort(-np.abs((now[n] - first[n]).values))[k]) + 1 for n in ("joint_rotation",) for k in (0, 1)]
-    turn = 1e3 * float(now["joint_rotation"].sel(joint=2))
-    shear = float(np.abs(first["shear_force"]).max()) / 1e3
-    return (
-        ("initial N of joints 1 to 6 [kN/m]", "1185 1452 1289 1290 1452 1185", joints("joint_axial_force")),
-        ("initial Q of joints [kN/m]; not -dM/ds of the table's own M", "-42 -159 278 -278 159 42",
-         joints("joint_shear_force") + f"; largest anywhere {shear:.0f}"),
-        ("initial M of joints [kN m/m]", "-178 147 3.5 4.5 146 -178", joints("joint_bending_moment")),
-        ("initial M at the invert [kN m/m]", "-267", f"{invert:.0f}"),
-        ("largest shear at 1000 kg/m [kN/m]", "+114 %", change("shear_force", "max")),
-        ("largest positive moment at 1000 kg/m [kN m/m]", "+82 %", change("bending_moment", "max")),
-        ("largest negative moment at 1000 kg/m [kN m/m]", "+75 %", change("bending_moment", "min")),
-        ("axial force at 1000 kg/m [kN/m]", "nearly unchanged", change("axial_force", "max")),
-        ("soil pressure at crown and invert at 1000 kg/m", "rises, by up to 100 %",
-         f"{rise[0]:+.0f} %, {rise[1]:+.0f} %"),
-        ("joints that turn most", "2 and 3, joint 2 opening outside",
-         f"{worst[0]} and {worst[1]}, joint 2 {turn:+.2f} mrad (outside: +)"),
-        ("inflow from 100 to 1000 kg/m", "almost linear, about 33 kg/m/s", f"linear, {rate:.0f} kg/m/s"),
-    )  # fmt: skip
-
-
 def report(folder, page):
     """Fill the page, and write its data and its pictures."""
     rows, data = measured(folder)
@@ -196,7 +157,6 @@ def report(folder, page):
             ("inflow kg/m", "N max kN", "N min kN", "Q max kN", "Q min kN", "M max kN m", "M min kN m",
              "joint rotations mrad"), forces(folder),
         ),
-        "published": table(("what", "published", "here"), beside_the_study(folder)),
     })  # fmt: skip
     data["provenance"] = {key: str(attributes[key]) for key in ("revision", "versions", "created", "scene_sha256")} | {
         "machine": provenance()["machine"], "cpu_seconds": seconds, "steps": steps, "point_steps": points,
@@ -211,7 +171,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--run", type=Path, help="folder of a finished run of case 3")
     folder = parser.parse_args().run
-    page = docs_page("case-3", "made", "measured", "forces", "published")
+    page = docs_page("case-3", "made", "measured", "forces")
     if folder is None:
         folder = Path("runs/case-3")
         coupling.run(coupling.load_scene("case-3"), out=folder, overwrite=True, figures=True)
