@@ -116,6 +116,14 @@ CONTACT = (
     Field("active", "1", "1 where the wall is there, 0 in an opening"),
 )
 
+#: A node on a side of the box that water passes; zeros elsewhere.
+SIDE = (
+    Field("area_x", "m2", "of the side, positive where x leads into the ground"),
+    Field("area_y", "m2", ""),
+    Field("push_x", "N/m", "of the pressure beyond on water as if it filled the whole volume"),
+    Field("push_y", "N/m", ""),
+)
+
 #: Reactions on the material at a node of a lining, times the time step, added up; and dt times their squares.
 REACTION = (
     Field("soil", "N s/m", "normal, of the grains"),
@@ -146,6 +154,7 @@ LEDGER = (
     Field("gravity", "J/m", "work of gravity"),
     Field("drag", "J/m", "work of the drag between grains and water"),
     Field("stress", "J/m", "work of the stresses"),
+    Field("recharge", "kg/m", "water that came in through the sides of the box"),
     Field("unexplained", "N s/m", "change of momentum at the lining that no recorded reaction explains"),
     Field("reactions", "N s/m", "the reactions that it is compared with"),
 )
@@ -178,4 +187,4 @@ def values(records, names):
 POINT_RECORD, NODE_RECORD, SUM_RECORD = record(POINT), record(NODE), record(NODAL_SUM)
 MOMENTUM_RECORD, TIED_RECORD, GEOMETRY_RECORD = record(NODAL_MOMENTUM), record(TIED_MEAN), record(GEOMETRY)
 CONTENT_RECORD, CONTACT_RECORD, REACTION_RECORD = record(CONTENT), record(CONTACT), record(REACTION)
-CLAMP_RECORD, LEDGER_RECORD = record(CLAMPS, np.int64), record(LEDGER)
+SIDE_RECORD, CLAMP_RECORD, LEDGER_RECORD = record(SIDE), record(CLAMPS, np.int64), record(LEDGER)

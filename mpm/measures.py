@@ -108,7 +108,7 @@ class Measures:
         -------
         dict
             momentum_departure [N s/m]: what the points' momentum differs by from what the nodes received, the larger
-            component; water_missing [kg/m]: water at the start less that now;
+            component; water_missing [kg/m]: water at the start, and what came through the sides, less that now;
             work_gravity, work_stress, work_drag, kinetic_energy_change, transfer_loss [J/m]: energies since the start,
             the last what the way from points to nodes and back (PIC, MUSL) took; contact_error [-]: change of the
             momentum at the lining that the recorded reactions do not explain, over their sum; largest_courant [-]: time
@@ -123,7 +123,7 @@ class Measures:
         change = now["kinetic"] - self.initial["kinetic"]
         return {
             "momentum_departure": self.copies * float(departure.max()),
-            "water_missing": self.copies * (self.initial["water"] - now["water"]),
+            "water_missing": self.copies * (self.initial["water"] + ledger["recharge"] - now["water"]),
             "work_gravity": self.copies * ledger["gravity"],
             "work_stress": self.copies * ledger["stress"],
             "work_drag": self.copies * ledger["drag"],

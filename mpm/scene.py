@@ -48,12 +48,16 @@ class Water(Part):
     drainage : str
         "two-phase": water has a velocity of its own, by drag and the conductivity of the soils. "undrained": it moves
         with the grains, the limit of a conductivity of zero; conductivities are not read.
+    sides : str
+        Left, right and bottom of the box: "closed", or "held", the ground beyond keeps the pore pressure of the start
+        and water passes.
     """
 
     table_depth: Length = Field(ge=0)
     density: Density = Field(gt=500, lt=2000)
     bulk_modulus: Pressure = Field(ge=1e6, le=1e11)
     drainage: Literal["two-phase", "undrained"] = "two-phase"
+    sides: Literal["closed", "held"] = "closed"
 
 
 #: A soil, of the class that its `model` names: one of these, or of a third party.
@@ -306,6 +310,11 @@ class Scene(Part):
                 f"water: drainage = 'undrained' needs linings that are held, got lining = "
                 f"'{self.lining_of(self.tunnels[moving[0]])}' of tunnel {moving[0]}, whose motion is solved with the "
                 "momentum of the water; leave drainage out and give a small hydraulic_conductivity"
+            )
+        if self.is_undrained and self.water.sides == "held":
+            raise ValueError(
+                "water: sides = 'held' needs water with a velocity of its own, got drainage = 'undrained'; leave one "
+                "of them out"
             )
         if self.water is not None and self.water.table_depth >= self.box.depth:
             raise ValueError(

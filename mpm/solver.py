@@ -46,9 +46,10 @@ from mpm.step.substep import (
 )
 from mpm.step.system import Cuts, Ground, Layout, Medium, Needs, Net, System, Tally, Walls
 from mpm.tables import element_geometry, element_neighbours, outflow_nodes
-from mpm.walls.contact import FIXED_X, FIXED_Y, MIRROR_X
+from mpm.walls.contact import FIXED_X, FIXED_Y
 from mpm.walls.moving import MovingLinings
 from mpm.walls.nodes import contact_nodes
+from mpm.walls.sides import sides_of
 
 PARTS = 4  # parts of the mesh that sum at the nodes on their own: fixed, so the bits do not depend on threads
 STEPS_BETWEEN_SORTS = 100
@@ -107,12 +108,8 @@ class Solver(Measures):
         m, n = len(mesh.elements), len(mesh.nodes)
         n_rows = len(self.levels.of_row)
         self.neighbours = element_neighbours(mesh, outflow_nodes(scene, mesh))
-        self.fixed = np.zeros(n, np.int8)
-        self.fixed[mesh.left] |= FIXED_X
-        self.fixed[mesh.right] |= FIXED_X
-        self.fixed[mesh.bottom] |= FIXED_X | FIXED_Y
         self.mirror_line = mesh.left if scene.is_half else mesh.left[:0]
-        self.fixed[self.mirror_line] |= MIRROR_X
+        self.fixed, self.sides = sides_of(scene, mesh, self.mirror_line)
         self._build_contact()
         self._layout = Layout(*(getattr(self.levels, name) for name in Layout._fields))
         self._cuts = Cuts(*np.zeros((3, self.levels.count, PARTS + 1), np.int64))
@@ -410,7 +407,7 @@ class Solver(Measures):
                 self.contents, levels.nodes, levels.next_row, levels.of_row, self.nodes, self.tied_means, self.status,
                 self.touched, self.sums, self.momenta, *self._empty,
             ),
-            Walls(self.fixed, self.contact_of_node, self.contact, self.wall, self.impulse),
+            Walls(self.fixed, self.sides, self.contact_of_node, self.contact, self.wall, self.impulse),
             self._cuts, self.clock, self._pace, self.medium,
             Tally(
                 self._counts, self._measures, self._limits, self._suspended, self._bad, self._n_left,

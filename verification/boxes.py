@@ -16,7 +16,7 @@ _SAND = {
     "model": "mohr-coulomb", "youngs_modulus": 2e7, "poissons_ratio": 0.3, "cohesion": 0.0, "friction_angle": 30.0,
     "dilatancy_angle": 0.0, "porosity": 0.4, "loose_porosity": 0.85, "grain_density": 2650.0, "k0": 0.5,
 }  # fmt: skip
-_WATER = ("bulk_modulus", "table_depth", "density", "drainage")
+_WATER = ("bulk_modulus", "table_depth", "density", "drainage", "sides")
 
 
 def box_scene(name, size, width, depth, gravity=9.81, points=3, **settings):

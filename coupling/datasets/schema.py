@@ -47,7 +47,7 @@ ERRORS = {
 BALANCES = {
     "momentum_departure": ("N s/m", "momentum of the points less what the nodes received, size"),
     "flow_momentum": ("N s/m", "sum of the sizes of the momenta of grains and water in the flow zone"),
-    "water_missing": ("kg/m", "water at the start less that now"),
+    "water_missing": ("kg/m", "water at the start, and what came through the sides, less that now"),
     "water_inflow": ("kg/m", "water that came through the outer face of the gate, that taken out included"),
     "flow_water": ("kg/m", "water of the flow zone"),
     "work_gravity": ("J/m", "work of gravity on grains and water since the gate opened"),

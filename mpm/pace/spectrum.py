@@ -30,7 +30,7 @@ from mpm.machine.team import shared
 from mpm.step.cells import felt_share
 from mpm.step.nodes_to_points import shares
 from mpm.step.points_to_nodes import gradients
-from mpm.walls.contact import FIXED_X, FIXED_Y, Masses, free_pair
+from mpm.walls.contact import FIXED_X, FIXED_Y, OPEN_X, OPEN_Y, Masses, free_pair
 
 SAFETY = 0.9  # Ritz values come from below, and points move until the next estimate
 TOLERANCE = 1e-2  # of the largest eigenvalue
@@ -58,7 +58,7 @@ class Operator(NamedTuple):
     stiffness: np.ndarray  # (n_elements,) records, the occupied elements one after the other, as the next
     masses: np.ndarray  # (n_elements, 2, 6) consistent, of grains and of water [kg/m]
     nodal: np.ndarray  # (n_nodes,) records
-    free: np.ndarray  # (n_nodes, 2) bool: components that are not held
+    free: np.ndarray  # (n_nodes, 4) bool: components of grains and water that are not held
     element_cuts: np.ndarray  # (n_parts + 1,) as the others; of the occupied elements
     node_cuts: np.ndarray
     at_nodes: np.ndarray  # (n_parts, n_nodes, 4) what parts sum there, one after the other: masses, forces, momenta
@@ -126,6 +126,8 @@ def gather_kernel(needs):
                 there, fixed = node.solid > 0.0, o.fixed[i]
                 o.free[i, 0] = there and not fixed & FIXED_X
                 o.free[i, 1] = there and not fixed & FIXED_Y
+                o.free[i, 2] = there and (fixed & OPEN_X or not fixed & FIXED_X)
+                o.free[i, 3] = there and (fixed & OPEN_Y or not fixed & FIXED_Y)
 
     return gather
 
@@ -183,7 +185,9 @@ def accelerate(i, o, drag_time):
     for axis in range(2):
         total, liquid = take(o.at_nodes, i, axis), take(o.at_nodes, i, axis + 2)
         if wet:
-            grains, water = free_pair(total, liquid, m) if o.free[i, axis] else (0.0, 0.0)
+            grains, water = free_pair(total, liquid, m)
+            if not o.free[i, axis]:
+                grains, water = 0.0, liquid / (m.liquid + m.drag) if o.free[i, axis + 2] else 0.0
             o.acceleration[i, axis], o.acceleration[i, axis + 2] = grains, water
         else:
             o.acceleration[i, axis] = total / m.solid if o.free[i, axis] else 0.0
@@ -250,7 +254,7 @@ def apply_kernel(width):
                 for x in range(width):
                     mass = o.nodal[i].solid if x < 2 else o.nodal[i].liquid
                     total = take(o.at_nodes, i, x)
-                    image[i, x] = -total / mass if o.free[i, x % 2] else 0.0
+                    image[i, x] = -total / mass if o.free[i, x] else 0.0
 
     return apply
 
@@ -335,7 +339,7 @@ class Spectrum:
             stiffness=np.zeros(len(mesh.elements), STIFFNESS_RECORD),
             masses=np.zeros((len(mesh.elements), 2, CORNER_PAIRS)),
             nodal=np.zeros(n_nodes, NODAL_RECORD),
-            free=np.zeros((n_nodes, 2), bool),
+            free=np.zeros((n_nodes, 4), bool),
             element_cuts=np.zeros(parts + 1, np.int64),
             node_cuts=np.linspace(0, n_nodes, parts + 1).astype(np.int64),
             at_nodes=np.zeros((parts, n_nodes, 4)),

@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 from mpm.machine.compile import inline_kernel, kernel_part
 from mpm.walls.contact import (
-    FIXED_X,
-    FIXED_Y,
     LIQUID_HELD,
     MIRROR_X,
+    OPEN_X,
+    OPEN_Y,
     SOLID_HELD,
     SOLID_STICKS,
     Masses,
@@ -17,6 +17,7 @@ from mpm.walls.contact import (
     free_pair,
     in_wall_frame,
 )
+from mpm.walls.sides import constrained, past_held_grains
 
 
 class Forces(NamedTuple):
@@ -58,6 +59,9 @@ def sum_kernel(needs):
                     plx += row.momentum_liquid_x
                     ply += row.momentum_liquid_y
             r = net.next_row[r]
+        if two_phase:
+            flx += walls.sides[i].push_x
+            fly += walls.sides[i].push_y
         if walls.fixed[i] & MIRROR_X:  # the mirror image's momentum is the opposite
             psx = plx = 0.0
         if wet and not two_phase:
@@ -281,6 +285,10 @@ def solve_kernel(needs):
             v = Pair(sx, sy, lx, ly)
         else:
             v = Pair(b.solid_x / m.solid, b.solid_y / m.solid, 0.0, 0.0)
+        if two_phase and walls.fixed[i] & (OPEN_X | OPEN_Y):
+            v, side = past_held_grains(v, b, m, walls.fixed[i]), walls.sides[i]
+            through = v.liquid_x * side.area_x + v.liquid_y * side.area_y
+            ledger.recharge += dt * system.medium.density_liquid * m.pore / m.liquid * through
         v = constrained(v, walls.fixed[i])
         node.change_solid_x = node.change_solid_y = node.change_liquid_x = node.change_liquid_y = 0.0
         set_velocity(node, v, u.solid_x, u.solid_y, u.liquid_x, u.liquid_y)
@@ -301,17 +309,6 @@ def solve_kernel(needs):
             solve_node(system.net.which_node[k], begun, system.tally.ledger[own], system)
 
     return solve_nodes
-
-
-@inline_kernel
-def constrained(v, fixed):
-    """Velocities under the constraints of box and mirror line."""
-    sx, sy, lx, ly = v
-    if fixed & FIXED_X:
-        sx = lx = 0.0
-    if fixed & FIXED_Y:
-        sy = ly = 0.0
-    return Pair(sx, sy, lx, ly)
 
 
 @cache

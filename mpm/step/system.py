@@ -76,6 +76,7 @@ class Walls(NamedTuple):
     """Constraints of the nodes, and what they felt."""
 
     fixed: np.ndarray  # (n_nodes,) int8, bits of `mpm.walls.contact`
+    sides: np.ndarray  # (n_nodes,) records
     contact_of_node: np.ndarray  # (n_nodes,) int32, row of the arrays that follow, or -1
     contact: np.ndarray  # (n_contact,) records
     velocity: np.ndarray  # (n_contact, 2) float64 of the lining [m/s]; read where linings move

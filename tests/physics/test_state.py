@@ -14,8 +14,9 @@ pytestmark = pytest.mark.slow
 
 #: Attributes of a solver that its state leaves out: built from scene and mesh, or by sorting the points.
 BUILT = {
-    "scene", "mesh", "soils", "parts", "geometry", "neighbours", "fixed", "contact_of_node", "n_contact", "contact",
-    "_contact_open", "_contact_closed", "lining", "threads", "initial_grain_mass", "initial", "workers", "needs",
+    "scene", "mesh", "soils", "parts", "geometry", "neighbours", "fixed", "sides", "contact_of_node", "n_contact",
+    "contact", "_contact_open", "_contact_closed", "lining", "threads", "initial_grain_mass", "initial", "workers",
+    "needs",
     "_long_step", "_extremes_of_soils", "_empty", "_water_density", "_water_modulus", "start", "order", "occupied",
     "n_occupied", "n_active", "_cuts", "levels", "copies", "mirror_line",
     "moving", "wall", "clock", "_layout", "touched", "_spectrum", "_altitude",

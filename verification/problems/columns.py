@@ -5,7 +5,8 @@ import math
 import numpy as np
 
 from mpm.solver import Solver
-from verification.boxes import STRESS, box_mesh, box_scene, inside, put, run_to, state
+from mpm.walls.contact import OPEN_X, OPEN_Y
+from verification.boxes import STRESS, box_mesh, box_scene, hold, inside, put, run_to, state
 from verification.driven import DrivenSolver
 from verification.loads import theory_pressures
 from verification.problems.problem import NUMERICS, WET, Problem, Result, register
@@ -59,6 +60,48 @@ def terzaghi(cells=20, conductivity=1e-4, bulk_modulus=8e7, time_factor=0.1, ine
     return Result.of(
         solver, seconds, np.sqrt(np.mean(miss**2)), time_step=longest[0], time=end, largest=np.abs(miss).max(),
         inertia=np.sqrt(np.mean((exact - series) ** 2)),
+    )  # fmt: skip
+
+
+def seepage(cells=10, conductivity=1e-3, upward=True, **numerics):
+    """Press water through 1 m of ground from one open side of the box to the other, until it flows steadily.
+
+    Upward it leaves through the surface; else from left to right below a lid. Reference: Darcy, q = k dp / (rho g L),
+    and a pressure that falls along a straight line.
+    """
+    excess, size = 2e3, 1.0 / cells
+    ground = {
+        "model": "elastic", "youngs_modulus": 4e7, "poissons_ratio": NU, "cohesion": 1e5, "porosity": POROSITY,
+        "loose_porosity": 0.6, "hydraulic_conductivity": conductivity, "bulk_modulus": 8e7, "sides": "held",
+    }  # fmt: skip
+    width, depth = (2 * size, 1.0) if upward else (1.0, 2 * size)
+    scene = box_scene("seepage", size, width, depth, **ground | numerics)
+    x = np.linspace(-width / 2, width / 2, round(width / size) + 1)
+    y = np.linspace(-depth, 0.0, round(depth / size) + 1)
+    solver = Solver(scene, box_mesh(x, np.append(y, size) if upward else y), threads=1)
+    mesh, sides = solver.mesh, solver.sides
+    shut, axis, nodes = ("x", "y", mesh.bottom) if upward else ("y", "x", mesh.left)
+    solver.fixed[sides[f"area_{shut}"] != 0] &= ~(OPEN_X if upward else OPEN_Y)
+    sides[f"area_{shut}"] = sides[f"push_{shut}"] = 0.0
+    sides[f"push_{axis}"][nodes] += excess * sides[f"area_{axis}"][nodes]
+    if not upward:
+        hold(solver, mesh.top, y=True)
+    storage = 1 / constrained_modulus() + POROSITY / 8e7
+    end, hydrostatic = 3.0 * 1000 * 9.81 * storage / conductivity, state(solver, "pore_pressure")
+    rate, area = [0.0, 0.0], sides[f"area_{axis}"][nodes]
+
+    def add(dt):
+        if solver.time > 0.8 * end:
+            speed = solver.nodes[f"velocity_liquid_{axis}"][nodes] * area
+            rate[0], rate[1] = rate[0] + dt * POROSITY * speed.sum() / area.sum(), rate[1] + dt
+
+    seconds = run_to(solver, end, after=add)
+    along = -state(solver, "y") if upward else 0.5 - state(solver, "x")
+    miss = (state(solver, "pore_pressure") - hydrostatic) / excess - along
+    darcy = conductivity * excess / (1000 * 9.81)
+    return Result.of(
+        solver, seconds, np.sqrt(np.mean(miss**2)), time=end, flow=rate[0] / rate[1] / darcy,
+        recharge=float(solver.ledger["recharge"].sum()), water_missing=solver.balances()["water_missing"],
     )  # fmt: skip
 
 
@@ -184,4 +227,13 @@ register(Problem(
     norm="root mean square error of the normal stresses over the vertical one", solve=oedometer, fast={"cells": 5},
     ladder={"cells": (3, 5, 10), "strain": (1e-4, 1e-3, 1e-2), "duration": (0.1, 0.5, 1.0), **NUMERICS},
     limit=2e-3, why="a wave of the acceleration of the plate remains: strain rate times 1 m over the wave speed",
+))  # fmt: skip
+
+register(Problem(
+    name="seepage", title="steady flow from one open side of the box to the other",
+    source="Darcy (1856): pressure falls along a straight line",
+    norm="root mean square of the pressure error over the excess", solve=seepage,
+    fast={"cells": 10, "conductivity": 1e-3},
+    ladder={"cells": (5, 10, 20), "conductivity": (1e-2, 1e-3, 1e-4), "upward": (True, False), **NUMERICS, **WET},
+    limit=2e-4, why="exact on linear triangles; what is left of the waves of the start",
 ))  # fmt: skip
