@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from structure.beams.lining import BeamSpringLining
-    from structure.capacity import SegmentSection
     from structure.checks import CapacityRule, Limits, check
     from structure.continuum.bolts import Bolts
     from structure.continuum.lining import ContinuumLining
@@ -16,7 +15,9 @@ if TYPE_CHECKING:
     from structure.inputs import GushingWarning, InputError
     from structure.lining import LiningFailure, LiningModel, additional
     from structure.models import lining_model, lining_model_names, register_lining_model
+    from structure.passing import utilisations
     from structure.ring import Ground, Ring
+    from structure.segment import SegmentSection
     from structure.theory import theoretical_pressures
 
     __version__: str
@@ -32,7 +33,8 @@ _HOMES = {
     "check": "structure.checks",
     "Limits": "structure.checks",
     "CapacityRule": "structure.checks",
-    "SegmentSection": "structure.capacity",
+    "utilisations": "structure.passing",
+    "SegmentSection": "structure.segment",
     "BeamSpringLining": "structure.beams.lining",
     "ContinuumLining": "structure.continuum.lining",
     "Gate": "structure.continuum.mesh",
@@ -65,6 +67,7 @@ __all__ = [
     "lining_model_names",
     "register_lining_model",
     "theoretical_pressures",
+    "utilisations",
 ]
 
 

@@ -8,7 +8,7 @@ from rich.console import Console
 
 from coupling.commands.exit_codes import JsonPath, answering, say
 from coupling.commands.options import SOURCE, RingScene
-from coupling.commands.tables import response_table
+from coupling.commands.tables import limits_table, response_table
 
 
 def draw_checks(checked, file, model, own_file=None, tunnel=None):
@@ -51,7 +51,7 @@ def respond_command(
     FILE-BACKEND.nc.
 
     JSON: keys of `coupling.postprocess.summary.summarise_response`, and `run`, `backend`, `file` (path of the
-    response); with --limits `utilisations` (largest of every check, 1 is its limit) and `figure` (path). Of several
+    response); with limits `figure` (path). Of several
     tunnels these are of that with the gate, `tunnels` has the same of the others.
     """
     with answering(json_path) as answer:
@@ -66,9 +66,8 @@ def respond_command(
         answers = []
         for source, target in zip(sources, targets, strict=True):
             response = responses.respond_by_name(source.ring, source.pressures, backend)
+            response = responses.with_checks(response, given)
             found = summarise_response(response)
-            if given is not None:
-                response, found["utilisations"] = responses.with_checks(response, given)
             found["file"] = str(responses.store_response(response, source, name, target))
             if given is not None:
                 found["figure"] = draw_checks(response, source.file, name, target, source.tunnel)
@@ -80,7 +79,6 @@ def respond_command(
             for source, found in zip(sources, answers, strict=True):
                 Console().print(response_table(found, source.tunnel))
                 if given is not None:
-                    shares = ", ".join(f"{k.replace('_', ' ')} {v:.2f}" for k, v in found["utilisations"].items())
-                    say(f"largest of its limit: {shares}")
+                    Console().print(limits_table(found["utilisations"], source.tunnel))
                     say(f"picture in {found['figure']}")
                 say(f"response in {found['file']}")
