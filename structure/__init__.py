@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from structure.beams.lining import BeamSpringLining
-    from structure.checks import CapacityRule, Limits, check
+    from structure.checks import check
     from structure.continuum.bolts import Bolts
     from structure.continuum.lining import ContinuumLining
     from structure.continuum.mesh import GasketGroove, Gate
     from structure.inputs import GushingWarning, InputError
+    from structure.limits import CapacityRule, Limits
     from structure.lining import LiningFailure, LiningModel, additional
     from structure.models import lining_model, lining_model_names, register_lining_model
     from structure.passing import utilisations
@@ -31,8 +32,8 @@ _HOMES = {
     "LiningFailure": "structure.lining",
     "additional": "structure.lining",
     "check": "structure.checks",
-    "Limits": "structure.checks",
-    "CapacityRule": "structure.checks",
+    "Limits": "structure.limits",
+    "CapacityRule": "structure.limits",
     "utilisations": "structure.passing",
     "SegmentSection": "structure.segment",
     "BeamSpringLining": "structure.beams.lining",

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
-from structure.checks import UTILISATIONS
+from structure.limits import UTILISATIONS
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Place = dict[str, float]
 
@@ -26,7 +28,7 @@ def utilisations(checked: xr.Dataset) -> dict[str, dict[str, Any]]:
     Returns
     -------
     dict
-        Utilisation, a name of :data:`structure.checks.UTILISATIONS`, to: largest [-], infinite (null in JSON) where
+        Utilisation, a name of :data:`structure.limits.UTILISATIONS`, to: largest [-], infinite (null in JSON) where
         nothing of the kind is carried; at: where and when that is; passes: where and when it first exceeds 1, None for
         never. A place and time holds time [s], inflow_mass [kg/m] where it is known, and theta [degree] or joint
         (number) where the utilisation has them. Empty for a plain response.
@@ -62,5 +64,6 @@ def _passing_times(values, time):
     after = np.argmax(beyond, axis=0)
     before, columns = np.maximum(after - 1, 0), np.arange(values.shape[1])
     low, high = values[before, columns], values[after, columns]
+    low = np.where(beyond[0], 0.0, low)
     share = np.where(beyond[0], 0.0, (1 - low) / np.where(high > low, high - low, 1.0))
     return np.where(beyond.any(axis=0), time[before] + share * (time[after] - time[before]), np.inf)

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from structure.inputs import Input
+from structure.plausibility import SEGMENT, Usual
 
 #: Strength classes of EN 1992-1-1, Table 3.1: of cylinders and of cubes [MPa].
 ConcreteClass = Literal[
@@ -47,6 +48,8 @@ class SegmentSection(Input):
 
     Source: EN 1992-1-1:2004, 2.4.2.4, 3.1, 3.2, Annex C.
     """
+
+    usual: ClassVar[Usual] = SEGMENT
 
     code: Literal["EN 1992-1-1"]
     concrete: ConcreteClass

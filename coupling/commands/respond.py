@@ -37,7 +37,7 @@ def respond_command(
     ] = "beam-spring",
     scene: RingScene = None,
     limits: Annotated[
-        Path | None, typer.Option(help="TOML file of structure.Limits: checks the response and draws its utilisations.")
+        Path | None, typer.Option(help="TOML file of structure.Limits in place of the [limits] of the scene.")
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="File for the response; when left out RUN itself, beside it where RUN is none.")
@@ -66,10 +66,10 @@ def respond_command(
         answers = []
         for source, target in zip(sources, targets, strict=True):
             response = responses.respond_by_name(source.ring, source.pressures, backend)
-            response = responses.with_checks(response, given)
+            response = responses.with_checks(response, source.limits if given is None else given)
             found = summarise_response(response)
             found["file"] = str(responses.store_response(response, source, name, target))
-            if given is not None:
+            if found["utilisations"]:
                 found["figure"] = draw_checks(response, source.file, name, target, source.tunnel)
             answers.append(found)
         data = {"run": str(run), "backend": name, **answers[0]}
@@ -78,7 +78,7 @@ def respond_command(
         if answer(data):
             for source, found in zip(sources, answers, strict=True):
                 Console().print(response_table(found, source.tunnel))
-                if given is not None:
+                if found["utilisations"]:
                     Console().print(limits_table(found["utilisations"], source.tunnel))
                     say(f"picture in {found['figure']}")
                 say(f"response in {found['file']}")

@@ -4,7 +4,7 @@ import math
 
 from rich.table import Table
 
-from structure.checks import UTILISATIONS
+from structure.limits import UTILISATIONS
 from structure.response import FORCES, SHOWN
 
 

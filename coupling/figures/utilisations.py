@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.colors import Normalize
 
 from coupling.figures.picture import GATE, INITIAL, NOW, SECOND, STYLE, Picture
-from structure.checks import UTILISATIONS
+from structure.limits import UTILISATIONS
 from structure.response import SHOWN
 
 COLOURS = (NOW, SECOND, "#38761d", "#674ea7", "#b45f06", "#0b7a75", "#a64d79", "#7f6000", "0.45")

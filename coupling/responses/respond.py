@@ -20,7 +20,7 @@ from structure.ring import Ring
 
 
 def respond(scene: Scene, pressures: xr.Dataset, backend: str = "beam-spring", tunnel: int | None = None) -> xr.Dataset:
-    """Response of the scene's ring to the pressures on a tunnel, by the lining model of that name.
+    """Response of the scene's ring to the pressures on a tunnel, by the lining model of that name, with its checks.
 
     tunnel : int or None, None: the one with the gate.
 
@@ -33,7 +33,7 @@ def respond(scene: Scene, pressures: xr.Dataset, backend: str = "beam-spring", t
         ring = ring_of(scene, number)
     except SceneError as problem:
         raise Refused(str(problem)) from None
-    return respond_by_name(ring, pressures, backend)
+    return with_checks(respond_by_name(ring, pressures, backend), scene.limits)
 
 
 def responses_on(

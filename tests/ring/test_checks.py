@@ -13,7 +13,7 @@ from test_sections import UNEQUAL, section
 from coupling.figures import utilisations as check_figures
 from structure import BeamSpringLining, CapacityRule, InputError, Limits, additional, check
 from structure.capacity import resultants
-from structure.checks import UTILISATIONS
+from structure.limits import UTILISATIONS
 
 RULE = dict(axial_force_factor=1.0, moment_factor=1.35, minimum_eccentricity=0.02, utilisation="radial", shear=True)
 CHECKED = {
