@@ -9,7 +9,7 @@ import xarray as xr
 
 from structure.capacity import interaction, moment_utilisation, radial_utilisation
 from structure.cracks import crack_width
-from structure.limits import UTILISATIONS, Limits
+from structure.limits import CHECK_VARIABLES, UTILISATIONS, Limits
 from structure.resistance import bearing_resistance, shear_resistance
 from structure.response import SHOWN
 from structure.ring import Ring
@@ -30,8 +30,9 @@ def check(response: xr.Dataset, limits: Limits) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        The response and, as far as limits are given: ``design_axial_force``, ``design_bending_moment``,
-        ``design_shear_force``, ``shear_resistance``, ``section_utilisation``, ``shear_utilisation``, ``crack_width``,
+        The response, without what earlier limits made of it, and, as far as limits are given:
+        ``design_axial_force``, ``design_bending_moment``, ``design_shear_force``, ``shear_resistance``,
+        ``section_utilisation``, ``shear_utilisation``, ``crack_width``,
         ``crack_utilisation`` (time, theta), ``capacity_axial_force``, ``capacity_bending_moment`` (capacity_point);
         ``bearing_resistance``, ``bearing_utilisation``, ``gasket_opening``, ``gasket_utilisation``,
         ``joint_dislocation_utilisation`` (time, joint); ``convergence_per_mille``, ``convergence_utilisation`` (time);
@@ -66,7 +67,8 @@ def check(response: xr.Dataset, limits: Limits) -> xr.Dataset:
     shares = [variables[name] for name in UTILISATIONS if name in variables]
     largest = xr.concat([share.max([d for d in share.dims if d != "time"]) for share in shares], "check").max("check")
     variables["largest_utilisation"] = _described(largest, "1", "largest utilisation of all limits")
-    return response.assign(variables).assign_attrs(limits=limits.model_dump_json(exclude_none=True))
+    plain = response.drop_vars(CHECK_VARIABLES, errors="ignore")
+    return plain.assign(variables).assign_attrs(limits=limits.model_dump_json(exclude_none=True))
 
 
 def _described(variable, units, long_name):

@@ -27,6 +27,12 @@ UTILISATIONS = {
     "convergence_utilisation": "convergence",
     **{f"{name}_utilisation": f"own limit of the {SHOWN[name].name}" for name in OWN},
 }
+#: Variables that checks add to a response; they are no states of the ring.
+CHECK_VARIABLES = (
+    "design_axial_force", "design_bending_moment", "design_shear_force", "capacity_axial_force",
+    "capacity_bending_moment", "shear_resistance", "bearing_resistance", "crack_width", "gasket_opening",
+    "convergence_per_mille", *UTILISATIONS, "largest_utilisation",
+)  # fmt: skip
 
 
 class CapacityRule(Input):

@@ -1,10 +1,8 @@
 """Tables that several commands show."""
 
-import math
-
 from rich.table import Table
 
-from structure.limits import UTILISATIONS
+from coupling.postprocess.limits import HEADS, limit_rows
 from structure.response import FORCES, SHOWN
 
 
@@ -29,18 +27,7 @@ def response_table(data, tunnel=None):
 
 def limits_table(found, tunnel=None):
     """Utilisations of limits with where they pass 1; `found` as of :func:`structure.utilisations`."""
-    of = "limits" if tunnel is None else f"limits of the ring of tunnel {tunnel}"
-    table = Table(of, "largest", "at", "passes 1")
-    for name, one in found.items():
-        largest = f"{one['largest']:.2f}" if math.isfinite(one["largest"]) else "not carried"
-        passes = "never" if one["passes"] is None else where_and_when(one["passes"])
-        table.add_row(UTILISATIONS[name], largest, where_and_when(one["at"]), passes)
+    table = Table(*HEADS, title=None if tunnel is None else f"limits of the ring of tunnel {tunnel}")
+    for row in limit_rows(found):
+        table.add_row(*row)
     return table
-
-
-def where_and_when(at):
-    """A place and time of :func:`structure.utilisations` in words."""
-    told = [f"{at['time']:.3g} s"]
-    told += [f"{at['inflow_mass']:.4g} kg/m"] if "inflow_mass" in at else []
-    told += [f"{at['theta']:.4g}°"] if "theta" in at else []
-    return ", ".join(told + ([f"joint {at['joint']:.0f}"] if "joint" in at else []))

@@ -138,3 +138,27 @@ def test_response_again_keeps_the_limits_of_the_scene_and_others_take_their_plac
     passes = data["utilisations"]["convergence_utilisation"]["passes"]
     assert passes["time"] == 0 and passes["inflow_mass"] == 0
     assert gush("respond", folder).exit_code == 0
+
+
+def test_page_of_the_run_tells_and_draws_its_limits(folder):
+    from coupling.report import page, run_page
+
+    shown = run_page.collect(folder)
+    found = utilisations(read_response(folder))
+    rows = {cells[0]: (cells, beyond) for cells, beyond in shown["limits"]["rows"]}
+    assert len(rows) == 8
+    cells, beyond = rows["joint opening at the gasket"]
+    assert cells[1] == f"{found['gasket_utilisation']['largest']:.2f}"
+    assert beyond == (found["gasket_utilisation"]["largest"] > 1)
+    series = shown["player"]["entries"][0]["models"][0]["series"]["crack_utilisation"]
+    np.testing.assert_array_equal(series, read_response(folder)["crack_utilisation"].max("theta"))
+    html = page.rendered(shown)
+    assert '<h2 id="limits">Limits</h2>' in html and 'data-chart="crack_utilisation"' in html
+    assert not np.isinf(shown["player"]["entries"][0]["models"][0]["series"]["bearing_utilisation"]).any()
+
+
+def test_page_of_a_run_without_limits_has_no_such_section(tmp_path):
+    from coupling.report import page, run_page
+
+    write_run(tmp_path / "run.nc", models=("beam-spring",))
+    assert 'id="limits"' not in page.rendered(run_page.collect(tmp_path / "run.nc"))
