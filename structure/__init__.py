@@ -8,15 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from structure.beams.lining import BeamSpringLining
-    from structure.capacity import SegmentSection
-    from structure.checks import CapacityRule, Limits, check
+    from structure.checks import check
     from structure.continuum.bolts import Bolts
     from structure.continuum.lining import ContinuumLining
     from structure.continuum.mesh import GasketGroove, Gate
     from structure.inputs import GushingWarning, InputError
+    from structure.limits import CapacityRule, Limits
     from structure.lining import LiningFailure, LiningModel, additional
     from structure.models import lining_model, lining_model_names, register_lining_model
+    from structure.passing import utilisations
     from structure.ring import Ground, Ring
+    from structure.segment import SegmentSection
     from structure.theory import theoretical_pressures
 
     __version__: str
@@ -30,9 +32,10 @@ _HOMES = {
     "LiningFailure": "structure.lining",
     "additional": "structure.lining",
     "check": "structure.checks",
-    "Limits": "structure.checks",
-    "CapacityRule": "structure.checks",
-    "SegmentSection": "structure.capacity",
+    "Limits": "structure.limits",
+    "CapacityRule": "structure.limits",
+    "utilisations": "structure.passing",
+    "SegmentSection": "structure.segment",
     "BeamSpringLining": "structure.beams.lining",
     "ContinuumLining": "structure.continuum.lining",
     "Gate": "structure.continuum.mesh",
@@ -65,6 +68,7 @@ __all__ = [
     "lining_model_names",
     "register_lining_model",
     "theoretical_pressures",
+    "utilisations",
 ]
 
 

@@ -1,7 +1,7 @@
 """Capacity of a reinforced concrete segment under axial force and bending: EN 1992-1-1, parabola-rectangle diagram.
 
-A rectangular section one metre wide (per metre of tunnel), one layer of steel near each face. Strains here are positive
-in compression; N and M have the signs of :mod:`structure.response`, so M > 0 compresses the inner face.
+Strains here are positive in compression; N and M have the signs of :mod:`structure.response`, so M > 0 compresses the
+inner face.
 """
 
 from __future__ import annotations
@@ -9,87 +9,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from pydantic import Field, model_validator
 
-from structure.inputs import Input
+from structure.segment import SegmentSection
 
 #: Gauss points over each part of the section with a smooth stress; the parabola needs two, other exponents a few.
 GAUSS_POINTS = 12
-
-
-class SegmentSection(Input):
-    """Concrete and steel of a segment; every value is the user's, none has a default.
-
-    Parameters
-    ----------
-    concrete_strength : float
-        Characteristic strength f_ck [Pa].
-    concrete_long_term_factor, concrete_partial_factor : float
-        alpha_cc and gamma_c [-]: f_cd = alpha_cc f_ck/gamma_c, Eq. (3.15).
-    concrete_peak_strain, concrete_strain_limit, concrete_exponent : float
-        eps_c2, eps_cu2 and n [-] of Eq. (3.17); Table 3.1 gives them (:func:`table_3_1`).
-    steel_area_outer, steel_area_inner : float
-        Steel near each face [m2 per metre of tunnel].
-    bar_depth_outer, bar_depth_inner : float
-        From each face to the axis of its bars [m]: cover and half a bar.
-    steel_strength, steel_partial_factor : float
-        f_yk [Pa] and gamma_s [-]; f_yd = f_yk/gamma_s, horizontal beyond it.
-    steel_modulus : float
-        E_s [Pa].
-    steel_strain_limit : float
-        eps_ud [-]; a large number (1.0) for none, as 3.2.7(2)b allows with a horizontal branch.
-
-    Source: EN 1992-1-1:2004, 3.1.7, 3.2.7, 6.1.
-    """
-
-    concrete_strength: float = Field(gt=0)
-    concrete_long_term_factor: float = Field(gt=0, le=1)
-    concrete_partial_factor: float = Field(ge=1)
-    concrete_peak_strain: float = Field(gt=0, lt=0.1)
-    concrete_strain_limit: float = Field(gt=0, lt=0.1)
-    concrete_exponent: float = Field(ge=1, le=2)
-    steel_area_outer: float = Field(gt=0)
-    steel_area_inner: float = Field(gt=0)
-    bar_depth_outer: float = Field(gt=0)
-    bar_depth_inner: float = Field(gt=0)
-    steel_strength: float = Field(gt=0)
-    steel_partial_factor: float = Field(ge=1)
-    steel_modulus: float = Field(gt=0)
-    steel_strain_limit: float = Field(gt=0)
-
-    @model_validator(mode="after")
-    def _check(self) -> SegmentSection:
-        if self.concrete_strain_limit < self.concrete_peak_strain:
-            raise ValueError(
-                f"concrete_strain_limit must be at least concrete_peak_strain {self.concrete_peak_strain:g}, got"
-                f" {self.concrete_strain_limit:g}; eps_cu2 is the larger of the two"
-            )
-        if self.steel_strain_limit < self.steel_strength / self.steel_partial_factor / self.steel_modulus:
-            raise ValueError(
-                f"steel_strain_limit must let the steel yield, got {self.steel_strain_limit:g} below f_yd/E_s ="
-                f" {self.steel_strength / self.steel_partial_factor / self.steel_modulus:g}; give eps_ud as a number,"
-                " not in per mille or percent"
-            )
-        return self
-
-    @property
-    def concrete_design_strength(self) -> float:
-        """f_cd [Pa], Eq. (3.15)."""
-        return self.concrete_long_term_factor * self.concrete_strength / self.concrete_partial_factor
-
-    @property
-    def steel_design_strength(self) -> float:
-        """f_yd [Pa]."""
-        return self.steel_strength / self.steel_partial_factor
-
-    def concrete_stress(self, strain: np.ndarray) -> np.ndarray:
-        """Stress [Pa] of the parabola-rectangle diagram, no tension, Eq. (3.17) and (3.18)."""
-        share = np.clip(strain / self.concrete_peak_strain, 0.0, 1.0)
-        return self.concrete_design_strength * (1 - (1 - share) ** self.concrete_exponent)
-
-    def steel_stress(self, strain: np.ndarray) -> np.ndarray:
-        """Stress [Pa], compression positive: elastic, then horizontal."""
-        return np.clip(self.steel_modulus * strain, -self.steel_design_strength, self.steel_design_strength)
 
 
 class Capacity(NamedTuple):
@@ -97,19 +21,6 @@ class Capacity(NamedTuple):
 
     axial_force: np.ndarray
     bending_moment: np.ndarray
-
-
-def table_3_1(strength: float) -> dict[str, float]:
-    """eps_c2, eps_cu2 and n of EN 1992-1-1, Table 3.1, for f_ck [Pa] up to 90 MPa, as keywords of the section."""
-    if not 12e6 <= strength <= 90e6:
-        raise ValueError(f"table_3_1: f_ck must lie in [12e6, 90e6] Pa, got {strength:g}; give it in Pa")
-    above, below = max(strength / 1e6 - 50, 0.0), (90 - strength / 1e6) / 100
-    high = strength > 50e6
-    return {
-        "concrete_peak_strain": 1e-3 * (2.0 + 0.085 * above**0.53),
-        "concrete_strain_limit": 1e-3 * (2.6 + 35 * below**4 if high else 3.5),
-        "concrete_exponent": 1.4 + 23.4 * below**4 if high else 2.0,
-    }
 
 
 def resultants(
@@ -143,8 +54,8 @@ def resultants(
     # depth from the outer face: what presses on the inner half bends with tension outside
     moment = (force * (depth - 0.5)).sum(1) * thickness
     bars = (
-        (section.steel_area_outer, section.bar_depth_outer),
-        (section.steel_area_inner, thickness - section.bar_depth_inner),
+        (section.steel_area("outer"), section.bar_depth("outer")),
+        (section.steel_area("inner"), thickness - section.bar_depth("inner")),
     )
     for area, at in bars:
         strain = (outer + slope * at / thickness)[:, 0]
@@ -181,15 +92,10 @@ def interaction(section: SegmentSection, thickness: float, count: int = 100) -> 
     The corners lie on the exact curve, so the polygon is inside it but for a slight hollow near pure tension. First the
     half that presses the inner face (M > 0), down to pure tension, then the other half back up.
     """
-    for name in ("bar_depth_outer", "bar_depth_inner"):
-        if getattr(section, name) >= thickness / 2:
-            raise ValueError(
-                f"{name} must be below half the thickness {thickness:g} m, got {getattr(section, name):g} m; it counts"
-                " from the face to the axis of the bars near it"
-            )
-    pressed, other = ultimate_strains(section, thickness, section.bar_depth_outer, count)
+    section.check_thickness(thickness)
+    pressed, other = ultimate_strains(section, thickness, section.bar_depth("outer"), count)
     positive = resultants(section, thickness, strain_outer=other, strain_inner=pressed)
-    pressed, other = ultimate_strains(section, thickness, section.bar_depth_inner, count)
+    pressed, other = ultimate_strains(section, thickness, section.bar_depth("inner"), count)
     negative = resultants(section, thickness, strain_outer=pressed, strain_inner=other)
     return Capacity(*(np.concatenate([down, up[-2:0:-1]]) for down, up in zip(positive, negative, strict=True)))
 

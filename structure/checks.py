@@ -1,104 +1,18 @@
-"""Checks of a response against limits that the user states: capacity, gaskets, convergence, each as a utilisation."""
+"""Checks of a response against limits: segments, joints, deformation, each as a utilisation."""
 
 from __future__ import annotations
 
-import json
-import tomllib
-from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import xarray as xr
-from pydantic import Field, ValidationError, model_validator
 
-from structure.capacity import SegmentSection, interaction, moment_utilisation, radial_utilisation
-from structure.inputs import Input, InputError, mistakes, refusal
-
-#: name: what it is, for figures and tables.
-UTILISATIONS = {
-    "section_utilisation": "axial force and moment in the segments",
-    "gasket_utilisation": "joint opening at the gasket",
-    "dislocation_utilisation": "joint dislocation",
-    "convergence_utilisation": "convergence",
-}
-
-
-class CapacityRule(Input):
-    """How internal forces are set against the capacity of the section; every value is the user's.
-
-    Parameters
-    ----------
-    axial_force_factor, moment_factor : float
-        Partial factors of actions: N_Ed and M_Ed over the computed N and M [-].
-    minimum_eccentricity : float
-        Least |M_Ed|/N_Ed in compression [m]: EN 1992-1-1, 6.1(4) asks for max(h/30, 20 mm); 0 for none.
-    utilisation : {"radial", "constant_axial_force"}
-        "radial": how far N_Ed and M_Ed are on their way to the diagram when they grow in proportion.
-        "constant_axial_force": |M_Ed| over the moment carried at the same N_Ed; infinite beyond the largest N.
-    """
-
-    axial_force_factor: float = Field(gt=0)
-    moment_factor: float = Field(gt=0)
-    minimum_eccentricity: float = Field(ge=0)
-    utilisation: Literal["radial", "constant_axial_force"]
-
-
-class Limits(Input):
-    """Limits of a lining; those left out are not checked, none has a default value.
-
-    Parameters
-    ----------
-    segment : SegmentSection, optional
-        Concrete and steel of the segments; with `capacity`.
-    capacity : CapacityRule, optional
-        How the forces are set against it; with `segment`.
-    gasket_opening : float, optional
-        Largest opening of a joint at its gasket [m].
-    gasket_offset : float, optional
-        Place of the gasket, from the centre line outward [m], negative on the inside; needed with `gasket_opening`.
-    joint_dislocation : float, optional
-        Largest step between the segments of a joint [m].
-    convergence_per_mille : float, optional
-        Largest change of the horizontal or vertical diameter over the outer diameter [per mille].
-    """
-
-    segment: SegmentSection | None = None
-    capacity: CapacityRule | None = None
-    gasket_opening: float | None = Field(default=None, gt=0)
-    gasket_offset: float | None = None
-    joint_dislocation: float | None = Field(default=None, gt=0)
-    convergence_per_mille: float | None = Field(default=None, gt=0)
-
-    @model_validator(mode="after")
-    def _check(self) -> Limits:
-        for one, other in (("segment", "capacity"), ("gasket_opening", "gasket_offset")):
-            if (getattr(self, one) is None) != (getattr(self, other) is None):
-                given, missing = (other, one) if getattr(self, one) is None else (one, other)
-                raise ValueError(f"{missing} must be given where {given} is, got none; state both or neither")
-        if not self.model_fields_set:
-            raise ValueError("limits must hold at least one limit, got none; state what is to be checked")
-        return self
-
-    @classmethod
-    def from_toml(cls, path: str | Path) -> Limits:
-        """Limits from a TOML file with the keys above, tables ``[segment]`` and ``[capacity]``; SI units.
-
-        Raises
-        ------
-        structure.InputError
-            No TOML, or no limits: every mistake with key, rule, value and remedy.
-        OSError
-            Not readable.
-        """
-        who = f"limits '{path}'"
-        try:
-            data = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
-            raise InputError(f"{who}: must be valid TOML, got: {problem}; correct it there") from None
-        try:
-            return cls.model_validate(data)
-        except ValidationError as error:
-            raise InputError(refusal(who, mistakes(error, cls))) from None
+from structure.capacity import interaction, moment_utilisation, radial_utilisation
+from structure.cracks import crack_width
+from structure.limits import CHECK_VARIABLES, UTILISATIONS, Limits
+from structure.resistance import bearing_resistance, shear_resistance
+from structure.response import SHOWN
+from structure.ring import Ring
 
 
 def check(response: xr.Dataset, limits: Limits) -> xr.Dataset:
@@ -110,17 +24,20 @@ def check(response: xr.Dataset, limits: Limits) -> xr.Dataset:
     Parameters
     ----------
     response : xarray.Dataset
-        What :meth:`structure.LiningModel.respond` returned; its attribute `ring` gives the diameters.
+        What :meth:`structure.LiningModel.respond` returned; its attribute `ring` gives thickness and diameters.
     limits : Limits
 
     Returns
     -------
     xarray.Dataset
-        The response and, as far as limits are given: ``design_axial_force``, ``design_bending_moment``,
-        ``section_utilisation`` (time, theta), ``capacity_axial_force``, ``capacity_bending_moment`` (capacity_point);
-        ``gasket_opening``, ``gasket_utilisation``, ``dislocation_utilisation`` (time, joint);
-        ``convergence_per_mille``, ``convergence_utilisation`` (time); and ``largest_utilisation`` (time) of all.
-        The attribute `limits` holds the limits as JSON.
+        The response, without what earlier limits made of it, and, as far as limits are given:
+        ``design_axial_force``, ``design_bending_moment``, ``design_shear_force``, ``shear_resistance``,
+        ``section_utilisation``, ``shear_utilisation``, ``crack_width``,
+        ``crack_utilisation`` (time, theta), ``capacity_axial_force``, ``capacity_bending_moment`` (capacity_point);
+        ``bearing_resistance``, ``bearing_utilisation``, ``gasket_opening``, ``gasket_utilisation``,
+        ``joint_dislocation_utilisation`` (time, joint); ``convergence_per_mille``, ``convergence_utilisation`` (time);
+        ``<quantity>_utilisation`` of own limits; and ``largest_utilisation`` (time) of all. The attribute `limits`
+        holds the limits as JSON. When and where each passes 1: :func:`structure.utilisations`.
 
     Raises
     ------
@@ -130,25 +47,35 @@ def check(response: xr.Dataset, limits: Limits) -> xr.Dataset:
     if "ring" not in response.attrs:
         raise ValueError("check: response must have the attribute 'ring' with the diameters, got none; take it as"
                          " respond() returned it")  # fmt: skip
-    ring = json.loads(response.attrs["ring"])
+    ring = Ring.model_validate_json(response.attrs["ring"])
+    limits.check_ring(ring)
     variables: dict[str, Any] = {}
-    if limits.segment is not None:
-        variables |= _capacity_check(response, limits, (ring["outer_diameter"] - ring["inner_diameter"]) / 2)
-    if limits.gasket_opening is not None or limits.joint_dislocation is not None:
-        variables |= _joint_checks(response, limits)
+    if limits.capacity is not None:
+        variables |= _segment_checks(response, limits, ring.thickness)
+    if limits.joint_contact_height is not None:
+        variables |= _bearing_check(response, limits, ring.thickness)
+    if limits.crack_width is not None:
+        variables |= _crack_check(response, limits, ring.thickness)
+    if limits.gasket_opening is not None:
+        variables |= _gasket_check(response, limits)
     if limits.convergence_per_mille is not None:
-        variables |= _convergence_check(response, limits.convergence_per_mille, ring["outer_diameter"])
+        variables |= _convergence_check(response, limits.convergence_per_mille, ring.outer_diameter)
+    dislocation = {} if limits.joint_dislocation is None else {"joint_dislocation": limits.joint_dislocation}
+    for name, largest in (dislocation | limits.own).items():
+        share = np.abs(response[name]) / largest
+        variables[f"{name}_utilisation"] = _described(share, "1", f"size of the {SHOWN[name].name} over its limit")
     shares = [variables[name] for name in UTILISATIONS if name in variables]
     largest = xr.concat([share.max([d for d in share.dims if d != "time"]) for share in shares], "check").max("check")
     variables["largest_utilisation"] = _described(largest, "1", "largest utilisation of all limits")
-    return response.assign(variables).assign_attrs(limits=limits.model_dump_json(exclude_none=True))
+    plain = response.drop_vars(CHECK_VARIABLES, errors="ignore")
+    return plain.assign(variables).assign_attrs(limits=limits.model_dump_json(exclude_none=True))
 
 
 def _described(variable, units, long_name):
     return variable.assign_attrs(units=units, long_name=long_name)
 
 
-def _capacity_check(response, limits, thickness):
+def _segment_checks(response, limits, thickness):
     rule = limits.capacity
     boundary = interaction(limits.segment, thickness)
     axial = rule.axial_force_factor * response["axial_force"]
@@ -158,34 +85,69 @@ def _capacity_check(response, limits, thickness):
     measure = radial_utilisation if rule.utilisation == "radial" else moment_utilisation
     share = axial.copy(data=measure(boundary, axial.values, moment.values))
     closed = [np.append(values, values[0]) for values in boundary]
-    return {
+    found = {
         "design_axial_force": _described(axial, "N/m", "design axial force, compression positive"),
         "design_bending_moment": _described(moment, "N m/m", "design bending moment, tension outside positive"),
         "section_utilisation": _described(share, "1", f"utilisation of the segments in N and M, {rule.utilisation}"),
         "capacity_axial_force": ("capacity_point", closed[0], _meaning("N/m", "axial force at capacity")),
         "capacity_bending_moment": ("capacity_point", closed[1], _meaning("N m/m", "bending moment at capacity")),
     }
+    if rule.shear:
+        shear = rule.moment_factor * response["shear_force"]
+        resisted = axial.copy(data=shear_resistance(limits.segment, thickness, axial.values, moment.values))
+        found |= {
+            "design_shear_force": _described(shear, "N/m", "design shear force, Q = -dM/ds"),
+            "shear_resistance": _described(resisted, "N/m", "shear resistance without shear reinforcement"),
+            "shear_utilisation": _described(_share(shear, resisted), "1", "shear force over the shear resistance"),
+        }
+    return found
+
+
+def _share(force, resistance):
+    """Size of a force over its resistance: 0 without a force, infinite where a force meets no resistance."""
+    size = np.abs(force.values)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return force.copy(data=np.where(size == 0, 0.0, size / resistance.values))
 
 
 def _meaning(units, long_name):
     return {"units": units, "long_name": long_name}
 
 
-def _joint_checks(response, limits):
-    if response.sizes.get("joint", 0) == 0:
-        raise ValueError("check: limits of joints need a ring with joints, got none; leave gasket_opening and"
-                         " joint_dislocation out")  # fmt: skip
-    variables = {}
-    if limits.gasket_opening is not None:
-        # rotation opens the outside
-        opening = response["joint_opening"] + limits.gasket_offset * response["joint_rotation"]
-        share = np.maximum(opening, 0.0) / limits.gasket_opening
-        variables["gasket_opening"] = _described(opening, "m", "joint opening at the gasket, gap positive")
-        variables["gasket_utilisation"] = _described(share, "1", "joint opening at the gasket over its limit")
-    if limits.joint_dislocation is not None:
-        share = np.abs(response["joint_dislocation"]) / limits.joint_dislocation
-        variables["dislocation_utilisation"] = _described(share, "1", "joint dislocation over its limit")
-    return variables
+def _bearing_check(response, limits, thickness):
+    rule = limits.capacity
+    axial = rule.axial_force_factor * np.maximum(response["joint_axial_force"], 0.0)
+    moment = rule.moment_factor * response["joint_bending_moment"]
+    resisted = axial.copy(
+        data=bearing_resistance(
+            limits.segment, thickness, limits.joint_contact_height, axial.values, moment.values
+        )
+    )  # fmt: skip
+    return {
+        "bearing_resistance": _described(resisted, "N/m", "resistance of the concrete under the contact zone"),
+        "bearing_utilisation": _described(_share(axial, resisted), "1", "axial force in the joint over the resistance"),
+    }
+
+
+def _crack_check(response, limits, thickness):
+    axial, moment = response["axial_force"], response["bending_moment"]
+    width = axial.copy(
+        data=crack_width(limits.segment, thickness, axial.values, moment.values, limits.crack_duration)
+    )  # fmt: skip
+    return {
+        "crack_width": _described(width, "m", f"crack width, {limits.crack_duration} load"),
+        "crack_utilisation": _described(width / limits.crack_width, "1", "crack width over its limit"),
+    }
+
+
+def _gasket_check(response, limits):
+    # rotation opens the outside
+    opening = response["joint_opening"] + limits.gasket_offset * response["joint_rotation"]
+    share = np.maximum(opening, 0.0) / limits.gasket_opening
+    return {
+        "gasket_opening": _described(opening, "m", "joint opening at the gasket, gap positive"),
+        "gasket_utilisation": _described(share, "1", "joint opening at the gasket over its limit"),
+    }
 
 
 def _convergence_check(response, limit, diameter):

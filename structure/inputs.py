@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import html
+import re
 import reprlib
 import textwrap
 import warnings
@@ -170,8 +171,9 @@ def _message(item: Any, model: type[BaseModel], extra_names: tuple[str, ...]) ->
     if kind == "string_pattern_mismatch":
         return f"must be letters, digits and the like, beginning with a letter or digit, got {given}; rename it"
     if kind == "literal_error" and isinstance(value, str):
-        near = difflib.get_close_matches(value.lower(), limits["expected"].replace("'", "").split(" or "), 1)
-        return f"{rule}, got {given}; " + (f"did you mean {near[0]!r}?" if near else "choose one of these")
+        names = {name.lower(): name for name in re.findall("'([^']*)'", limits["expected"])}
+        near = difflib.get_close_matches(value.lower(), names, 1)
+        return f"{rule}, got {given}; " + (f"did you mean {names[near[0]]!r}?" if near else "choose one of these")
     remedy = next(
         (f"give a value {sign} {limits[key]:g}" for key, sign in _LIMITS.items() if key in limits), "correct it"
     )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from structure.limits import CHECK_VARIABLES
 from structure.pressures import PRESSURES, check_pressures
 from structure.response import COORDINATES, NOT_ADDITIONAL, RESPONSE
 from structure.springs import limit_pressures
@@ -146,7 +147,7 @@ def additional(response: xr.Dataset) -> xr.Dataset:
     -------
     xarray.Dataset
         The same variables and coordinates, zero at the first record, long names beginning with "additional".
-        ``inflow_mass`` is carried along as it is; the residuals, which are no states, are left out.
+        ``inflow_mass`` is carried along as it is; residuals and checks, which are no states, are left out.
     """
     if response.sizes.get("time", 0) == 0:
         raise ValueError(
@@ -154,7 +155,7 @@ def additional(response: xr.Dataset) -> xr.Dataset:
             f" {dict(response.sizes)}; keep the initial state, do not select a single time"
         )
     changed = {}
-    for name, variable in response.data_vars.items():
+    for name, variable in response.drop_vars(CHECK_VARIABLES, errors="ignore").data_vars.items():
         if name == "inflow_mass":
             changed[str(name)] = variable
         elif "time" in variable.dims and name not in NOT_ADDITIONAL:

@@ -36,6 +36,19 @@ GROUND: Usual = {
     "limit_pressure_normal": (500, 1e9, "Pa", PRESSURE),
     "limit_pressure_tangential": (500, 1e9, "Pa", PRESSURE),
 }
+#: What is told of limits: a metre that was meant as a millimetre, or the reverse.
+LIMITS: Usual = {
+    "gasket_opening": (1e-4, 0.1, "m", LENGTH),
+    "joint_dislocation": (1e-4, 0.2, "m", LENGTH),
+    "joint_contact_height": (0.02, 2, "m", LENGTH),
+    "crack_width": (1e-5, 5e-3, "m", LENGTH),
+    "convergence_per_mille": (0.05, 200, "per mille", {"as a ratio": 1e3}),
+}
+SEGMENT: Usual = {
+    **{f"cover_{face}": (0.005, 0.2, "m", LENGTH) for face in ("outer", "inner")},
+    **{f"bar_diameter_{face}": (0.004, 0.06, "m", LENGTH) for face in ("outer", "inner")},
+    **{f"bar_spacing_{face}": (0.02, 1, "m", LENGTH) for face in ("outer", "inner")},
+}
 
 
 def unusual(value: Any, low: float, high: float, unit: str, others: dict[str, float]) -> str:

@@ -7,7 +7,7 @@ import sys
 import time as clock
 from datetime import UTC, datetime
 
-from coupling.commands.exit_codes import INTERRUPTED, exit_code
+from coupling.commands.exit_codes import INTERRUPTED, exit_code, finite
 
 
 class EventStream:
@@ -50,7 +50,7 @@ class EventStream:
             return
         line = {"event": event, "at": datetime.now(UTC).isoformat(timespec="milliseconds"), **data}
         try:
-            self._out.write(json.dumps(_finite(line)) + "\n")
+            self._out.write(json.dumps(finite(line)) + "\n")
             self._out.flush()
         except BrokenPipeError:
             self._out = None
@@ -78,12 +78,3 @@ class EventStream:
             self.tell("warning", message=message)
 
         return both
-
-
-def _finite(value):
-    """JSON knows no infinity."""
-    if isinstance(value, dict):
-        return {key: _finite(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(entry) for entry in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -5,6 +5,7 @@ Exit codes: 0 done, 1 rerun differs, 2 refused input, 3 run failed, 130 interrup
 
 import contextlib
 import json
+import math
 import sys
 import warnings
 from pathlib import Path
@@ -81,11 +82,20 @@ def write_json(path, data):
     """Write a result as JSON to a file, to standard output for "-", nowhere for None."""
     if path is None:
         return
-    text = json.dumps(data, indent=2) + "\n"
+    text = json.dumps(finite(data), indent=2, allow_nan=False) + "\n"
     if str(path) == "-":
         sys.stdout.write(text)
     else:
         path.write_text(text, encoding="utf-8")
+
+
+def finite(value):
+    """A result with null for what is no finite number: JSON has no other word for it."""
+    if isinstance(value, dict):
+        return {key: finite(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(entry) for entry in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def plain(text):

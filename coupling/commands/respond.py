@@ -8,7 +8,7 @@ from rich.console import Console
 
 from coupling.commands.exit_codes import JsonPath, answering, say
 from coupling.commands.options import SOURCE, RingScene
-from coupling.commands.tables import response_table
+from coupling.commands.tables import limits_table, response_table
 
 
 def draw_checks(checked, file, model, own_file=None, tunnel=None):
@@ -37,7 +37,7 @@ def respond_command(
     ] = "beam-spring",
     scene: RingScene = None,
     limits: Annotated[
-        Path | None, typer.Option(help="TOML file of structure.Limits: checks the response and draws its utilisations.")
+        Path | None, typer.Option(help="TOML file of structure.Limits in place of the [limits] of the scene.")
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="File for the response; when left out RUN itself, beside it where RUN is none.")
@@ -51,7 +51,7 @@ def respond_command(
     FILE-BACKEND.nc.
 
     JSON: keys of `coupling.postprocess.summary.summarise_response`, and `run`, `backend`, `file` (path of the
-    response); with --limits `utilisations` (largest of every check, 1 is its limit) and `figure` (path). Of several
+    response); with limits `figure` (path). Of several
     tunnels these are of that with the gate, `tunnels` has the same of the others.
     """
     with answering(json_path) as answer:
@@ -66,11 +66,10 @@ def respond_command(
         answers = []
         for source, target in zip(sources, targets, strict=True):
             response = responses.respond_by_name(source.ring, source.pressures, backend)
+            response = responses.with_checks(response, source.limits if given is None else given)
             found = summarise_response(response)
-            if given is not None:
-                response, found["utilisations"] = responses.with_checks(response, given)
             found["file"] = str(responses.store_response(response, source, name, target))
-            if given is not None:
+            if found["utilisations"]:
                 found["figure"] = draw_checks(response, source.file, name, target, source.tunnel)
             answers.append(found)
         data = {"run": str(run), "backend": name, **answers[0]}
@@ -79,8 +78,7 @@ def respond_command(
         if answer(data):
             for source, found in zip(sources, answers, strict=True):
                 Console().print(response_table(found, source.tunnel))
-                if given is not None:
-                    shares = ", ".join(f"{k.replace('_', ' ')} {v:.2f}" for k, v in found["utilisations"].items())
-                    say(f"largest of its limit: {shares}")
+                if found["utilisations"]:
+                    Console().print(limits_table(found["utilisations"], source.tunnel))
                     say(f"picture in {found['figure']}")
                 say(f"response in {found['file']}")

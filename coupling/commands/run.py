@@ -11,7 +11,7 @@ from rich.table import Table
 from coupling.commands.events import EventStream
 from coupling.commands.exit_codes import JsonPath, answering, checked_json, say, warn
 from coupling.commands.options import Changes, Quiet, Threads
-from coupling.commands.tables import response_table
+from coupling.commands.tables import limits_table, response_table
 from coupling.runs.progress_line import ProgressLine
 
 
@@ -78,6 +78,8 @@ def run_command(
             for tunnel, one in {None: data, **data["tunnels"]}.items():
                 if one["response"]:
                     Console().print(response_table(one["response"], tunnel))
+                    if one["response"]["utilisations"]:
+                        Console().print(limits_table(one["response"]["utilisations"], tunnel))
             say(f"errors: {quality_line(data['quality'])}")
             say(f"states of the points, no errors: {states_line(data['quality'])}")
             say(f"results in {folder}")

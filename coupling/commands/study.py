@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from coupling.commands.exit_codes import FAILED, JsonPath, answering, say
+from coupling.studies.limits import HEADS, limit_rows
 from structure.response import SHOWN
 
 
@@ -37,6 +38,8 @@ def study_command(
         data = run_study(study, out, workers, scheduler, Console(stderr=True))
         if answer(data):
             Console().print(_study_table(data))
+            if data["limits"]:
+                Console().print(_limits_table(data))
             say(f"data: {data['data']}")
         if any(case["status"] == "failed" for case in data["cases"]):
             raise typer.Exit(FAILED)
@@ -59,4 +62,11 @@ def _study_table(data):
             cells += [" to ".join(ends) or "-"]
             cells += [f"{case['cpu_seconds']:.1f}"]
         table.add_row(case["name"], *cells, case["message"] or case["status"])
+    return table
+
+
+def _limits_table(data):
+    table = Table(*HEADS)
+    for row in limit_rows(data["limits"], {case["case"]: case["name"] for case in data["cases"]}):
+        table.add_row(*row)
     return table

@@ -2,6 +2,7 @@
 
 from rich.table import Table
 
+from coupling.postprocess.limits import HEADS, limit_rows
 from structure.response import FORCES, SHOWN
 
 
@@ -21,4 +22,12 @@ def response_table(data, tunnel=None):
             scale = SHOWN[name].scale
             cells = (" ".join(f"{scale * value:.2f}" for value in data[name][state]) for state in ("initial", "final"))
             table.add_row(SHOWN[name].label.replace("[", "\\["), *cells)
+    return table
+
+
+def limits_table(found, tunnel=None):
+    """Utilisations of limits with where they pass 1; `found` as of :func:`structure.utilisations`."""
+    table = Table(*HEADS, title=None if tunnel is None else f"limits of the ring of tunnel {tunnel}")
+    for row in limit_rows(found):
+        table.add_row(*row)
     return table

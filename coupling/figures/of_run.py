@@ -12,6 +12,7 @@ from coupling.figures.ground import fields_around_tunnel, mesh_near_gate
 from coupling.figures.history import inflow
 from coupling.figures.picture import RESOLUTION
 from coupling.figures.ring import deformed_ring, internal_forces, pressures_polar
+from coupling.figures.utilisations import checks
 
 if TYPE_CHECKING:
     from coupling.datasets.open_run import Run
@@ -55,4 +56,6 @@ def _pictures(run):
                 response = read_response(run, tunnel=tunnel)
                 yield f"internal_forces{end}", internal_forces(response)
                 yield f"deformed_ring{end}", deformed_ring(response)
+                if "largest_utilisation" in response:
+                    yield f"checks{end}", checks(response)
     yield "inflow", inflow(read_history(run))

@@ -7,15 +7,10 @@ import numpy as np
 from matplotlib.colors import Normalize
 
 from coupling.figures.picture import GATE, INITIAL, NOW, SECOND, STYLE, Picture
-from structure.checks import UTILISATIONS
+from structure.limits import UTILISATIONS
 from structure.response import SHOWN
 
-COLOURS = {
-    "section_utilisation": NOW,
-    "gasket_utilisation": SECOND,
-    "dislocation_utilisation": "#38761d",
-    "convergence_utilisation": "#674ea7",
-}
+COLOURS = (NOW, SECOND, "#38761d", "#674ea7", "#b45f06", "#0b7a75", "#a64d79", "#7f6000", "0.45")
 RECORDS = 6  # clouds of points drawn in the diagram, the first and the last among them
 
 
@@ -83,12 +78,13 @@ def _over_time(axis, checked):
     over_mass = "inflow_mass" in checked and checked["inflow_mass"].values[-1] > 0
     along = checked["inflow_mass" if over_mass else "time"].values
     top = 1.0
-    for name, label in UTILISATIONS.items():
-        if name not in checked:
-            continue
+    names = [name for name in UTILISATIONS if name in checked]
+    for k, name in enumerate(names):
         largest = checked[name].max([d for d in checked[name].dims if d != "time"]).values
-        axis.plot(along, largest, "o-" if len(along) == 1 else "-", color=COLOURS[name], label=label)
-        top = max(top, largest[np.isfinite(largest)].max(initial=0.0))
+        largest = np.where(np.isfinite(largest), largest, np.nan)  # what nothing carries has no place on an axis
+        marks, colour = "o-" if len(along) == 1 else "-", COLOURS[k % len(COLOURS)]
+        axis.plot(along, largest, marks, color=colour, label=UTILISATIONS[name])
+        top = max(top, np.nanmax(largest, initial=0.0))
     axis.axhline(1.0, color=GATE, lw=1.0, ls=(0, (4, 2)))
     axis.annotate("limit", (0.01, 1.0), xycoords=("axes fraction", "data"), va="bottom", color=GATE, fontsize=7)
     axis.set_ylim(0, 1.12 * top)
@@ -99,4 +95,4 @@ def _over_time(axis, checked):
     axis.grid(True, color="0.88")
     axis.spines[["top", "right"]].set_visible(False)
     axis.tick_params(colors=INITIAL, labelcolor="0.1")
-    axis.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=1 if len(UTILISATIONS) < 3 else 2, fontsize=7)
+    axis.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=1 if len(names) < 3 else 2, fontsize=7)

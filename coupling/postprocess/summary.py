@@ -10,6 +10,7 @@ from coupling.datasets.open_run import Run
 from coupling.postprocess.extremes import extremes
 from coupling.postprocess.quality import lining_equilibrium, quality, verdicts
 from mpm.fields import CLAMPS
+from structure.passing import utilisations
 from structure.response import FORCES
 
 PLACES = {"crown": 0, "right waist": 90, "invert": 180, "left waist": 270}
@@ -87,7 +88,8 @@ def summarise_response(response: xr.Dataset) -> dict[str, Any]:
     dict
         axial_force, shear_force [N/m], bending_moment [N m/m]: for "initial" and "final" max, max_theta, min, min_theta
         [degree]; joint_opening, joint_dislocation [m], joint_rotation [rad]: for "initial" and "final" the value of
-        every joint; equilibrium_residual [-]: the largest.
+        every joint; equilibrium_residual [-]: the largest; utilisations: as of :func:`structure.utilisations`, empty
+        without limits.
     """
     data = {}
     states = {"initial": response.isel(time=0), "final": response.isel(time=-1)}
@@ -102,4 +104,5 @@ def summarise_response(response: xr.Dataset) -> dict[str, Any]:
     for name in ("joint_opening", "joint_dislocation", "joint_rotation"):
         data[name] = {state: record[name].values.tolist() for state, record in states.items()}
     data["equilibrium_residual"] = lining_equilibrium(response)
+    data["utilisations"] = utilisations(response)
     return data

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 from coupling.postprocess.extremes import shown_extreme
+from structure.limits import UTILISATIONS
 from structure.response import FORCES, PRESSURES, SHOWN
 
 
@@ -51,6 +52,8 @@ OF_RING = (
     _extremes("rotation", "Largest size of joint rotation", "joint_rotation_max"),
     *(_extremes(name, _capital(SHOWN[name].name), name)
       for name in ("convergence_vertical", "convergence_horizontal", "settlement")),
+    *(Chart(name, f"Utilisation, 1 is the limit: {what}", "", 1.0, "progress", (name,), True)
+      for name, what in UTILISATIONS.items()),
 )  # fmt: skip
 #: Of the table at the slider: (key, heading, unit, factor, of a lining model).
 COLUMNS = (

@@ -11,6 +11,7 @@ from coupling.datasets.geometry import on_tunnel
 from coupling.datasets.tree import match_times, model_names
 from coupling.postprocess.extremes import extremes, ring_extremes
 from coupling.report.packing import evenly, levels
+from structure.limits import CHECK_VARIABLES, UTILISATIONS
 from structure.lining import at_whole_degrees
 from structure.response import FORCES, PRESSURES
 
@@ -54,7 +55,8 @@ def run_states(run, tunnel, records):
         response = run[structure_group(name, tunnel)].to_dataset()
         rows, present = match_times(response["time"].values, times)
         if present.any():
-            answer = at_whole_degrees(response).drop_vars("inflow_mass", errors="ignore").isel(time=rows)
+            left = {"inflow_mass", *CHECK_VARIABLES} - UTILISATIONS.keys()
+            answer = at_whole_degrees(response).drop_vars(left, errors="ignore").isel(time=rows)
             answer = answer.assign_coords(time=times).where(xr.DataArray(present, dims="time"))
             answers.append(answer.expand_dims(model=[name]))
     if answers:
@@ -172,5 +174,8 @@ def ring_series(states):
             series |= {key: values.values for key, values in shape.items() if key != "inflow_mass"}
         if model.sizes.get("joint"):
             series["joint_dislocation_max"] = abs(model["joint_dislocation"]).max("joint").values
+        for name in UTILISATIONS.keys() & set(model.data_vars):
+            largest = model[name].max([dim for dim in model[name].dims if dim != "progress"]).values
+            series[name] = np.where(np.isfinite(largest), largest, np.nan)  # a chart has no infinity
         found.append(series | ({"settlement": model["settlement"].values} if "settlement" in model else {}))
     return found

@@ -2,9 +2,10 @@
 
 import xarray as xr
 
-from coupling.datasets import RunFileError, identifier, opened, read_run
+from coupling.datasets import RunFileError, identifier, opened, read_run, structure_group
 from coupling.datasets.geometry import gate_of, gate_tunnel, tunnels_beside
 from coupling.datasets.tree import model_names
+from coupling.postprocess.limits import HEADS, limit_rows
 from coupling.postprocess.summary import summarise_run
 from coupling.refused import Refused, SceneError
 from coupling.report.curves import MOST_IN_DETAIL, MOST_STOPS, budget, entry, ring_series, run_states
@@ -15,6 +16,7 @@ from coupling.report.trust import quality, run_warnings
 from coupling.runs.progress_line import duration
 from coupling.scenes.features import facts
 from coupling.scenes.scene import parse_scene
+from structure.passing import utilisations
 
 MOST_RECORDS = 600
 VERDICTS = {True: "as expected", False: "look at this", None: "–", "poor": "poor: look at this"}
@@ -57,6 +59,7 @@ def collect(run, model=None):
         "cost": _cost(summary),
         "numbers": _numbers(tree, answers),
         "balances": [(what, value, VERDICTS.get(good, good), good in (False, "poor")) for what, value, good in rows],
+        "limits": _limits(tree),
         "facts": [] if scene is None else facts(scene),
         "parts": [] if scene is None else left_out(scene),
         "ground_options": [(key, one["label"]) for key, one in (fields or {"fields": {}})["fields"].items()],
@@ -122,6 +125,18 @@ def _numbers(tree, answers):
         names = model_names(tree, tunnel)
         groups[", ".join([f"Forces and deformation of the ring{of}", *names[:1]])] = ring_numbers(names, found, key)
     return {title: numbers for title, numbers in groups.items() if numbers}
+
+
+def _limits(tree):
+    """Utilisations of the first lining model of every tunnel as a table; no rows without limits."""
+    rows = []
+    for tunnel in (None, *tunnels_beside(tree["lining"])):
+        names, of = model_names(tree, tunnel), "" if tunnel is None else f", tunnel {tunnel}"
+        found = utilisations(tree[structure_group(names[0], tunnel)].to_dataset()) if names else {}
+        for (name, *cells), one in zip(limit_rows(found), found.values(), strict=True):
+            rows.append(((f"{name}{of}", *cells), one["largest"] > 1))
+    about = "Utilisations over all records, 1 is the limit; between records they are taken as linear in time."
+    return {"heads": HEADS, "rows": rows, "about": about}
 
 
 def _stops(states, records):

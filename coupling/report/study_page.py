@@ -19,6 +19,7 @@ from coupling.studies.case import RUN_FOLDER
 from coupling.studies.collect import stored_cases, unreadable
 from coupling.studies.design import Range, StudyError, short_names, value_text
 from coupling.studies.execute import case_file
+from coupling.studies.limits import HEADS, limit_rows, limits_of_case, limits_of_study
 from structure.lining import at_whole_degrees
 from structure.models import model_name
 
@@ -77,6 +78,7 @@ def collect(folder, beside, model=None):
         "lost": lost,
         "done": done,
         "table": _table(done),
+        "limits": _limits(done, whole, models[0] if models else None),
         "trust": _trust(done),
         "player": player,
     }  # fmt: skip
@@ -188,6 +190,15 @@ def _table(done):
         rows.append((row, [*cells, *({"value": row[name]} for name in ("cpu_seconds", "wall_seconds")),
                            {"value": len(row["warnings"])}]))  # fmt: skip
     return {"heads": [*heads, ("processor time", "s"), ("wall time", "s"), ("warnings", "")], "rows": rows}
+
+
+def _limits(done, whole, model):
+    """The worst case and the share of cases beyond every limit as a table; no rows without limits."""
+    found = limits_of_study({row["number"]: limits_of_case(whole[row["number"]], model) for row in done})
+    rows = limit_rows(found, {row["number"]: row["label"] for row in done})
+    beyond = [one["beyond"] > 0 for one in found.values()]
+    about = f"Utilisations of {model} over all records of a case, 1 is the limit."
+    return {"heads": HEADS, "rows": list(zip(rows, beyond, strict=True)), "about": about}
 
 
 def _trust(done):

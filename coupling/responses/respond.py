@@ -14,14 +14,13 @@ from coupling.responses.source import Source
 from coupling.scenes.rings import gate_tunnel, ring_of
 from coupling.scenes.scene import Scene
 from structure import Limits, check, lining_model
-from structure.checks import UTILISATIONS
 from structure.lining import at_whole_degrees
 from structure.models import model_name
 from structure.ring import Ring
 
 
 def respond(scene: Scene, pressures: xr.Dataset, backend: str = "beam-spring", tunnel: int | None = None) -> xr.Dataset:
-    """Response of the scene's ring to the pressures on a tunnel, by the lining model of that name.
+    """Response of the scene's ring to the pressures on a tunnel, by the lining model of that name, with its checks.
 
     tunnel : int or None, None: the one with the gate.
 
@@ -34,7 +33,7 @@ def respond(scene: Scene, pressures: xr.Dataset, backend: str = "beam-spring", t
         ring = ring_of(scene, number)
     except SceneError as problem:
         raise Refused(str(problem)) from None
-    return respond_by_name(ring, pressures, backend)
+    return with_checks(respond_by_name(ring, pressures, backend), scene.limits)
 
 
 def responses_on(
@@ -68,16 +67,17 @@ def read_limits(path: Path) -> Limits:
         raise Refused(f"limits '{path}': cannot be read: {problem.strerror}; give a TOML file") from problem
 
 
-def with_checks(response: xr.Dataset, limits: Limits) -> tuple[xr.Dataset, dict[str, float]]:
-    """The response with the variables of `structure.check`, and the largest value of every utilisation.
+def with_checks(response: xr.Dataset, limits: Limits | None) -> xr.Dataset:
+    """The response with the variables of `structure.check`; as it is for None.
 
     Raises Refused: the response lacks what a limit needs.
     """
+    if limits is None:
+        return response
     try:
-        checked = check(response, limits)
+        return check(response, limits)
     except ValueError as problem:
-        raise Refused(str(problem)) from problem
-    return checked, {name: float(checked[name].max()) for name in UTILISATIONS if name in checked}
+        raise Refused(f"limits: {problem}") from problem
 
 
 def chosen_file(source: Source, model: str, out: Path | None = None, overwrite: bool = False) -> Path | None:

@@ -12,6 +12,7 @@ from coupling.refused import SceneError
 from coupling.scenes.rings import ring_of
 from coupling.scenes.scene import Scene, load_scene, parse_scene
 from structure.inputs import mistakes, refusal
+from structure.limits import Limits
 from structure.lining import check_pressures
 from structure.ring import Ring
 
@@ -20,7 +21,7 @@ class Source(NamedTuple):
     """Pressures (time, theta) [Pa] of one tunnel and the ring they act on.
 
     is_own : whether they are the group /lining of a run and the ring is that run's own, so that the response belongs
-    into the run;  tunnel : None: the only one, or that with the gate.
+    into the run;  tunnel : None: the only one, or that with the gate;  limits : those of the scene with the ring.
     """
 
     file: Path
@@ -28,6 +29,7 @@ class Source(NamedTuple):
     pressures: xr.Dataset
     ring: Ring
     tunnel: int | None = None
+    limits: Limits | None = None
 
 
 def read_source(path: str | Path, scene: str | None = None) -> Source:
@@ -82,7 +84,7 @@ def _source(file, is_run, pressures, root, own, chosen, tunnel):
     except ValueError as problem:
         raise RunFileError(f"'{file}': {problem}") from problem
     is_own = is_run and own is not None and own.ring is not None and _ring(file, root, own, tunnel) == ring
-    return Source(file, is_own, checked, ring, tunnel)
+    return Source(file, is_own, checked, ring, tunnel, None if chosen is None else chosen.limits)
 
 
 def _ring(file, root, scene, tunnel):

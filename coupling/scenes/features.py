@@ -51,6 +51,8 @@ def features(scene: Scene, threads: int, why_alone: str = "one thread") -> list[
     part("several threads", threads > 1, f"{threads} threads" if threads > 1 else why_alone)
     answer = f"beam-spring, {len(ring.joint_angles)} joints" if ring else "the scene has no [ring]"
     part("ring response", ring is not None, answer)
+    told = scene.limits.in_words if scene.limits else "the scene has no [limits]"
+    part("limits of the lining", scene.limits is not None, told)
     return rows
 
 
@@ -92,6 +94,8 @@ def facts(scene: Scene) -> list[tuple[str, str]]:
             normal, shear = ring.joint_normal_stiffness / 1e6, ring.joint_shear_stiffness / 1e6
             turn = f"rotation {ring.joint_rotational_stiffness / 1e6:g} MN m/rad"
             tell("joints", f"{turn}, normal {normal:g} MN/m, shear {shear:g} MN/m, a metre")
+    if scene.limits is not None:
+        tell("limits", scene.limits.in_words)
     return rows
 
 

@@ -16,7 +16,7 @@ MOST_BYTES = 1_000_000
 MOST_LEVELS = 12
 CHANGES = "changes in Python"
 #: What a scene may leave out although its base has it: `water = "none"` makes it dry.
-OPTIONAL = ("water", "gate", "ring", "k0")
+OPTIONAL = ("water", "gate", "ring", "limits", "k0")
 NONE = "none"
 
 

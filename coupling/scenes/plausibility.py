@@ -12,10 +12,12 @@ from structure.plausibility import (
     DENSITY,
     GROUND,
     LENGTH,
+    LIMITS,
     PERCENT,
     PRESSURE,
     RADIANS,
     RING,
+    SEGMENT,
     is_number,
     joints_in_radians,
     unusual,
@@ -58,6 +60,8 @@ USUAL = {
     },
     "ring": RING,
     "ring.ground": GROUND,
+    "limits": LIMITS,
+    "limits.segment": SEGMENT,
 }
 #: Least ground between a tunnel and the held edges of the box, in diameters; analyses of practice leave twice as much.
 LEAST_BESIDE, LEAST_BELOW = 1.5, 1.0

@@ -1,4 +1,4 @@
-"""The ring of a tunnel: its units, what of it follows from the ground, and the rings that [ring] does not describe."""
+"""The ring of a tunnel and its limits: units, what follows from the ground, and rings beside [ring]."""
 
 from __future__ import annotations
 
@@ -10,47 +10,52 @@ from coupling.refused import SceneError
 from mpm.quantities import quantity_in
 from mpm.scene import Scene as MpmScene
 from structure.inputs import Mistake, mistakes
+from structure.limits import OWN
+from structure.response import RESPONSE
 from structure.ring import Ring
 
 if TYPE_CHECKING:
     from coupling.scenes.scene import Scene
 
-#: Keys of [ring], dotted, to the units of `structure.Ring`, so that they take strings with units as other tables do.
-#: A ring is one metre of tunnel: what is per metre may leave that out.
+#: Dotted keys of [ring] and [limits] to the units of `structure`, so that they take strings with units as other tables
+#: do. A ring is one metre of tunnel: what is per metre may leave that out.
 UNITS = {
-    name: unit
-    for unit, names in {
-        "m": "outer_diameter inner_diameter joint_contact_height",
-        "degree": "joint_angles ground.friction_angle",
-        "Pa": "concrete_modulus ground.youngs_modulus ground.cohesion ground.vertical_stress ground.horizontal_stress "
-        "ground.limit_pressure_normal ground.limit_pressure_tangential",
-        "N/m**3": "concrete_unit_weight",
-        "N*m/rad/m": "joint_rotational_stiffness",
-        "N/m/m": "joint_normal_stiffness joint_shear_stiffness",
+    f"{table}.{name}": unit
+    for (table, unit), names in {
+        ("ring", "m"): "outer_diameter inner_diameter joint_contact_height",
+        ("ring", "degree"): "joint_angles ground.friction_angle",
+        ("ring", "Pa"): "concrete_modulus ground.youngs_modulus ground.cohesion ground.vertical_stress "
+        "ground.horizontal_stress ground.limit_pressure_normal ground.limit_pressure_tangential",
+        ("ring", "N/m**3"): "concrete_unit_weight",
+        ("ring", "N*m/rad/m"): "joint_rotational_stiffness",
+        ("ring", "N/m/m"): "joint_normal_stiffness joint_shear_stiffness",
+        ("limits", "m"): "gasket_opening gasket_offset joint_dislocation joint_contact_height crack_width "
+        "capacity.minimum_eccentricity segment.cover_outer segment.cover_inner segment.bar_diameter_outer "
+        "segment.bar_diameter_inner segment.bar_spacing_outer segment.bar_spacing_inner",
     }.items()
     for name in names.split()
-}
+} | {f"limits.own.{name}": RESPONSE[name][1].replace(" ", "*") for name in OWN}
 
 
-def ring_in_si(ring: dict[str, Any], home: str = "") -> tuple[dict[str, Any], list[Mistake]]:
-    """The table [ring] with its quantities as numbers, and the mistakes among them."""
-    numbers, wrong = dict(ring), []
-    for key, value in ring.items():
-        name = f"{home}{key}"
-        if name == "ground" and isinstance(value, dict):
-            numbers[key], more = ring_in_si(value, "ground.")
+def in_si(data: dict[str, Any], table: str) -> tuple[dict[str, Any], list[Mistake]]:
+    """A table of the structure, "ring" or "limits", with its quantities as numbers, and the mistakes among them."""
+    numbers, wrong = dict(data), []
+    for key, value in data.items():
+        name = f"{table}.{key}"
+        if isinstance(value, dict):
+            numbers[key], more = in_si(value, name)
             wrong += more
         elif name in UNITS:
             try:
                 several = isinstance(value, list | tuple)
-                numbers[key] = [ring_number(name, entry) for entry in value] if several else ring_number(name, value)
+                numbers[key] = [number_of(name, entry) for entry in value] if several else number_of(name, value)
             except ValueError as problem:
-                wrong.append((("ring", *name.split(".")), str(problem)))
+                wrong.append((tuple(name.split(".")), str(problem)))
     return numbers, wrong
 
 
-def ring_number(name: str, value: Any) -> Any:
-    """A value of [ring] as a number in its unit; `name` as "ground.cohesion".
+def number_of(name: str, value: Any) -> Any:
+    """A value of the structure as a number in its unit; `name` as "ring.ground.cohesion".
 
     Raises ValueError: as :func:`mpm.quantities.quantity_in`.
     """

@@ -30,13 +30,16 @@ from coupling.scenes.layers import (
 )
 from coupling.scenes.mistakes import mistake_line
 from coupling.scenes.plausibility import hints
-from coupling.scenes.rings import UNITS, derived_ring, ring_in_si, ring_number
+from coupling.scenes.rings import UNITS, derived_ring, in_si, number_of, ring_of
 from mpm.quantities import quantity_in
 from mpm.scene import Scene as MpmScene
 from structure.inputs import Input, mistakes, models_in, shortened, table_html
+from structure.limits import Limits
 from structure.ring import Ring
 
 ADVICE = "no default, see the built-in case-3 for an example"
+# What dotted names of the structure's tables begin with.
+STRUCTURE = ("ring.", "limits.")
 # Keys of [ring] and [ring.ground] that follow from the ground when left out.
 DERIVED = (
     "outer_diameter",
@@ -51,9 +54,10 @@ DERIVED = (
 
 
 class Scene(Input, MpmScene):
-    """A complete scene: ground, tunnels and gate as `mpm.Scene`, and `ring` for the structure (None: no ring)."""
+    """A complete scene: ground, tunnels, gate as `mpm.Scene`, `ring` and its `limits` for the structure, or None."""
 
     ring: Ring | None = None
+    limits: Limits | None = None
 
     def __repr__(self) -> str:
         from coupling.scenes.features import facts
@@ -124,6 +128,20 @@ class Scene(Input, MpmScene):
                 )
         return self
 
+    @model_validator(mode="after")
+    def _check_limits(self) -> "Scene":
+        if self.limits is None:
+            return self
+        if self.ring is None:
+            raise ValueError("limits: must come with a ring, got none; add [ring], or leave [limits] out")
+        for tunnel in range(len(self.tunnels)):
+            try:
+                self.limits.check_ring(ring_of(self, tunnel))
+            except ValueError as problem:
+                where = "limits" if len(self.tunnels) == 1 else f"limits, ring of tunnel {tunnel}"
+                raise ValueError(f"{where}: {problem}") from None
+        return self
+
 
 def load_scene(name: str | Path, /, **changes: Any) -> Scene:
     """Load a built-in scene by name or a TOML file by path.
@@ -187,7 +205,8 @@ def make_scene(data: dict[str, Any], origin: str = "scene", layers: tuple[Layer,
     Parameters
     ----------
     data : dict
-        Tables ``box``, ``water``, ``soils`` .. of `mpm.Scene`, ``ring`` of `structure.Ring`, and ``base`` as in a file.
+        Tables ``box``, ``water``, ``soils`` .. of `mpm.Scene`, ``ring`` of `structure.Ring`, ``limits`` of
+        `structure.Limits`, and ``base`` as in a file.
     origin : str
         What the message of an error starts with.
     layers : tuple of Layer
@@ -209,33 +228,23 @@ def make_scene(data: dict[str, Any], origin: str = "scene", layers: tuple[Layer,
         data = merged((Layer(origin, "", {key: value for key, value in data.items() if key != "base"}), *below))
         layers = (*layers, *below)
     whole, data = data, dict(data)
-    ring_data = data.pop("ring", None)
+    ring_data, limits_data = data.pop("ring", None), data.pop("limits", None)
     problems = _truth_values(whole, Scene, ())
-    ground = ring = None
+    ground = None
     try:
         ground = MpmScene.model_validate(data)
     except ValidationError as error:
-        problems += mistakes(error, MpmScene, extra_names=("ring", "base"), advice=ADVICE)
-    if ring_data is not None:
-        if not isinstance(ring_data, dict):
-            problems.append(
-                (("ring",), f"must be a table, got {shortened(ring_data)}; write [ring] with its keys below")
-            )
-        else:
-            derived = {} if ground is None else derived_ring(ground)
-            if ring_data.get("ground") == NONE:
-                ring_data = {**ring_data, "ground": None}
-            ring_data, wrong = ring_in_si(ring_data)
-            problems += wrong
-            try:
-                ring = Ring.model_validate(changed(derived, ring_data)) if not wrong else None
-            except ValidationError as error:
-                # Without a valid ground there is nothing to derive the missing keys from.
-                found = mistakes(error, Ring, silent=() if derived else DERIVED, advice=ADVICE)
-                problems += [(("ring", *location), message) for location, message in found]
+        problems += mistakes(error, MpmScene, extra_names=("ring", "limits", "base"), advice=ADVICE)
+    # Without a valid ground there is nothing to derive the missing keys of the ring from.
+    derived = {} if ground is None else derived_ring(ground)
+    if isinstance(ring_data, dict) and ring_data.get("ground") == NONE:
+        ring_data = {**ring_data, "ground": None}
+    ring, found = _of_structure("ring", Ring, ring_data, derived, silent=() if derived else DERIVED, advice=ADVICE)
+    limits, more = _of_structure("limits", Limits, limits_data, {})
+    problems += found + more
     if not problems and ground is not None:
         try:
-            return Scene.model_validate(data | {"ring": ring})
+            return Scene.model_validate(data | {"ring": ring, "limits": limits})
         except ValidationError as error:
             problems += mistakes(error, Scene)
     unusual = hints(whole)
@@ -244,13 +253,29 @@ def make_scene(data: dict[str, Any], origin: str = "scene", layers: tuple[Layer,
     raise SceneError("\n  ".join(lines))
 
 
+def _of_structure(table, model, data, derived, **about_mistakes):
+    """What a table of the structure describes, None where it is left out or wrong, and its mistakes."""
+    if data is None:
+        return None, []
+    if not isinstance(data, dict):
+        return None, [((table,), f"must be a table, got {shortened(data)}; write [{table}] with its keys below")]
+    data, wrong = in_si(data, table)
+    if wrong:
+        return None, wrong
+    try:
+        return model.model_validate(changed(derived, data)), []
+    except ValidationError as error:
+        found = mistakes(error, model, **about_mistakes)
+        return None, [((table, *location), message) for location, message in found]
+
+
 def number_in_unit(name: str, value: Any) -> Any:
     """A string with a unit as the number that the key of that dotted name takes; anything else as it is.
 
     Raises ValueError: as :func:`mpm.quantities.quantity_in`.
     """
-    if name.startswith("ring."):
-        return ring_number(".".join(_without_numbers(name)[1:]), value)
+    if name.startswith(STRUCTURE):
+        return number_of(".".join(_without_numbers(name)), value)
     unit = unit_of(name)
     return value if unit is None else quantity_in(unit, value)
 
@@ -258,8 +283,8 @@ def number_in_unit(name: str, value: Any) -> Any:
 def unit_of(name: str) -> str | None:
     """Unit of the key of a dotted name, as pint reads it; None where it has none, or where there is no such key."""
     *tables, key = _without_numbers(name)
-    if tables[:1] == ["ring"]:
-        return UNITS.get(".".join([*tables[1:], key]))
+    if name.startswith(STRUCTURE):
+        return UNITS.get(".".join([*tables, key]))
     try:
         model = MpmScene
         for table in tables:

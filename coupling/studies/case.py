@@ -92,20 +92,24 @@ def at_inflow_masses(pressures, history, responses, masses):
     -------
     xarray.Dataset
         Pressures (progress, theta); time, zones and so on (progress); variables of the responses with a dimension
-        `model`; `inflow_mass` (progress) [kg/m]; progress from 0 to 1 is the share of the last
-        inflow mass, so that cases of different stops stack. cpu_seconds, quality numbers as scalars.
+        `model`; of checks (model) NAME_largest [-] over all records and NAME_passing_mass, the inflow mass [kg/m] at
+        which it first passes 1, NaN for never, NAME of :data:`structure.limits.UTILISATIONS`; `inflow_mass`
+        (progress) [kg/m]; progress from 0 to 1 is the share of the last inflow mass, so that cases of different stops
+        stack. cpu_seconds, quality numbers as scalars.
     """
     import xarray as xr
 
     from coupling.datasets import BALANCES
     from coupling.postprocess.quality import quality
+    from structure.limits import CHECK_VARIABLES
 
     reached, unique = _times(history, masses)
     parts = [_at(pressures[["soil_pressure", "water_pressure", "soil_shear"]], reached)]
     parts.append(_at(history[[name for name in PROGRESS if name != "time" and name in history]], reached))
     if responses:
-        keep = [name for name in next(iter(responses.values())).data_vars if name != "inflow_mass"]
-        models = [_at(response[keep], reached) for response in responses.values()]
+        plain = {name: response.drop_vars(CHECK_VARIABLES, errors="ignore") for name, response in responses.items()}
+        keep = [name for name in next(iter(plain.values())).data_vars if name != "inflow_mass"]
+        models = [_at(response[keep], reached).assign(_limits(responses[name])) for name, response in plain.items()]
         parts.append(xr.concat(models, dim=xr.IndexVariable("model", list(responses)), join="outer"))
     result = xr.merge(parts, compat="no_conflicts", join="outer")
     share = masses / max(masses[-1], 1e-300)
@@ -122,6 +126,21 @@ def at_inflow_masses(pressures, history, responses, masses):
         if name != "clamps":
             result[f"quality_{name}"] = ((), float(value), {"units": "1", "long_name": name.replace("_", " ")})
     return result
+
+
+def _limits(response):
+    """What a whole response makes of its limits, as variables of a case."""
+    from structure.limits import UTILISATIONS
+    from structure.passing import utilisations
+
+    found = {}
+    for name, one in utilisations(response).items():
+        passing = np.nan if one["passes"] is None else one["passes"].get("inflow_mass", np.nan)
+        what = UTILISATIONS[name]
+        found[f"{name}_largest"] = ((), one["largest"], {"units": "1", "long_name": f"largest utilisation, {what}"})
+        about = {"units": "kg/m", "long_name": f"inflow mass at which the utilisation passes 1, {what}"}
+        found[f"{name}_passing_mass"] = ((), passing, about)
+    return found
 
 
 def _times(history, masses):

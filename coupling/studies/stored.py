@@ -7,10 +7,11 @@ from functools import partial
 import numpy as np
 
 from coupling.files.replace import replaced
+from coupling.studies.limits import limits_of_case, limits_of_study
 from structure.models import model_name
 
 #: Keys of a case's result.
-RESULTS = ("cpu_seconds", "inflow_mass", "time", "axial_force", "bending_moment")
+RESULTS = ("cpu_seconds", "inflow_mass", "time", "axial_force", "bending_moment", "utilisations")
 
 
 def run_study(name, out, workers, scheduler, console):
@@ -21,7 +22,9 @@ def run_study(name, out, workers, scheduler, console):
     dict
         study, folder, data: path of the dataset; model: the first lining model; cases: list of dicts with case, name,
         parameters, status, message, cpu_seconds [s], and at the last inflow mass reached: inflow_mass [kg/m], time [s],
-        axial_force [N/m] and bending_moment [N m/m] of that model as {max, min}, None without a ring.
+        axial_force [N/m] and bending_moment [N m/m] of that model as {max, min}, None without a ring; utilisations of
+        that model over the whole case, as :func:`coupling.studies.limits.limits_of_case`; limits: as
+        :func:`coupling.studies.limits.limits_of_study`.
     """
     from coupling.datasets import write_dataset
     from coupling.studies.cases import cases
@@ -53,8 +56,14 @@ def run_study(name, out, workers, scheduler, console):
                 **(_result(one, plan.backends) if status == "finished" else dict.fromkeys(RESULTS)),
             }
         )
-    model = model_name(plan.backends[0]) if plan.backends else None
-    return {"study": plan.name, "folder": str(folder), "data": str(folder / DATA_FILE), "model": model, "cases": rows}
+    return {
+        "study": plan.name,
+        "folder": str(folder),
+        "data": str(folder / DATA_FILE),
+        "model": model_name(plan.backends[0]) if plan.backends else None,
+        "cases": rows,
+        "limits": limits_of_study({row["case"]: row["utilisations"] for row in rows if row["utilisations"]}),
+    }
 
 
 def _result(one, backends):
@@ -68,4 +77,5 @@ def _result(one, backends):
             values = last[name].sel(model=model_name(backends[0])) if "model" in last.dims else last[name]
             if np.isfinite(values).any():
                 found[name] = {"max": float(values.max()), "min": float(values.min())}
+    found["utilisations"] = limits_of_case(one, model_name(backends[0]) if backends and "model" in one.dims else None)
     return found

@@ -12,7 +12,9 @@ from coupling import SceneError
 from coupling.scenes.layers import parse_changes
 from coupling.scenes.rings import UNITS
 from mpm.scene import Scene as MpmScene
+from structure.limits import CapacityRule, Limits
 from structure.ring import Ground, Ring
+from structure.segment import SegmentSection
 
 # Every published case with what sets it apart: gate angle, soil strength and stiffness, cover.
 CASES = {
@@ -283,12 +285,15 @@ def test_ring_takes_strings_with_units():
         coupling.load_scene("quick", ring={"concrete_modulus": "34 m"})
 
 
-def test_every_number_of_a_ring_has_a_unit_or_is_one():
+def test_every_number_of_a_ring_and_its_limits_has_a_unit_or_is_one():
     dimensionless = {
         "concrete_poissons_ratio", "joint_friction_coefficient", "n_elements", "poissons_ratio",
+        "convergence_per_mille", "own", "axial_force_factor", "moment_factor",
+        "concrete_long_term_factor", "concrete_partial_factor", "steel_partial_factor",
     }  # fmt: skip
-    ground = {name.removeprefix("ground.") for name in UNITS if name.startswith("ground.")}
-    for model, units in ((Ring, {name for name in UNITS if "." not in name}), (Ground, ground)):
+    tables = {"ring": Ring, "ring.ground": Ground, "limits": Limits, "limits.segment": SegmentSection}
+    for table, model in (tables | {"limits.capacity": CapacityRule}).items():
+        units = {name.rpartition(".")[2] for name in UNITS if name.rpartition(".")[0] == table}
         numbers = {
             name
             for name, field in model.model_fields.items()

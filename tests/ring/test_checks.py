@@ -13,9 +13,13 @@ from test_sections import UNEQUAL, section
 from coupling.figures import utilisations as check_figures
 from structure import BeamSpringLining, CapacityRule, InputError, Limits, additional, check
 from structure.capacity import resultants
-from structure.checks import UTILISATIONS
+from structure.limits import UTILISATIONS
 
-RULE = dict(axial_force_factor=1.0, moment_factor=1.35, minimum_eccentricity=0.02, utilisation="radial")
+RULE = dict(axial_force_factor=1.0, moment_factor=1.35, minimum_eccentricity=0.02, utilisation="radial", shear=True)
+CHECKED = {
+    f"{what}_utilisation"
+    for what in ("section", "shear", "crack", "bearing", "gasket", "joint_dislocation", "convergence", "joint_rotation")
+}
 
 
 def limits(**changes):
@@ -24,8 +28,12 @@ def limits(**changes):
         capacity=CapacityRule(**RULE),
         gasket_opening=6e-3,
         gasket_offset=0.1,
+        joint_contact_height=0.175,
+        crack_width=0.2e-3,
+        crack_duration="long-term",
         joint_dislocation=10e-3,
         convergence_per_mille=5.0,
+        own=dict(joint_rotation=4e-3),
     )
     return Limits(**{name: value for name, value in (values | changes).items() if value is not None})
 
@@ -45,7 +53,7 @@ def test_response_stays_as_it_was_and_every_addition_is_described(response, chec
     for name in response.data_vars:
         xr.testing.assert_identical(checked[name], response[name])
     added = set(checked.data_vars) - set(response.data_vars)
-    assert set(UTILISATIONS) | {"largest_utilisation", "gasket_opening", "convergence_per_mille"} <= added
+    assert CHECKED | {"largest_utilisation", "gasket_opening", "convergence_per_mille", "crack_width"} <= added
     for name in added:
         assert set(checked[name].attrs) == {"units", "long_name"}
     assert json.loads(checked.attrs["limits"])["capacity"]["moment_factor"] == 1.35
@@ -87,7 +95,10 @@ def test_joints_and_convergence_by_hand(response, checked):
     # 1e-12: the same expressions.
     np.testing.assert_allclose(checked["gasket_utilisation"], np.maximum(opening, 0) / 6e-3, rtol=1e-12)
     np.testing.assert_allclose(
-        checked["dislocation_utilisation"], np.abs(response["joint_dislocation"]) / 10e-3, rtol=1e-12
+        checked["joint_dislocation_utilisation"], np.abs(response["joint_dislocation"]) / 10e-3, rtol=1e-12
+    )
+    np.testing.assert_allclose(
+        checked["joint_rotation_utilisation"], np.abs(response["joint_rotation"]) / 4e-3, rtol=1e-12
     )
     larger = np.maximum(np.abs(response["convergence_horizontal"]), np.abs(response["convergence_vertical"]))
     np.testing.assert_allclose(checked["convergence_per_mille"], 1e3 * larger / 6.6, rtol=1e-12)
@@ -101,7 +112,7 @@ def test_gasket_opens_on_the_side_that_the_rotation_opens(response):
 
 
 def test_largest_utilisation_is_that_of_all_checks(checked):
-    parts = [checked[name].max([d for d in checked[name].dims if d != "time"]).values for name in UTILISATIONS]
+    parts = [checked[name].max([d for d in checked[name].dims if d != "time"]).values for name in CHECKED]
     np.testing.assert_array_equal(checked["largest_utilisation"], np.max(parts, axis=0))
 
 
@@ -126,12 +137,12 @@ def test_constant_axial_force_differs_from_radial(response, checked):
 
 def test_limits_from_toml_are_the_same(tmp_path):
     path = tmp_path / "limits.toml"
-    given = limits()
-    lines = [f"{k} = {v}" for k, v in given.model_dump().items() if not isinstance(v, dict)]
-    for table in ("segment", "capacity"):
-        lines += [f"[{table}]", *(f"{k} = {v!r}".replace("'", '"') for k, v in given.model_dump()[table].items())]
-    path.write_text("\n".join(lines))
-    assert Limits.from_toml(path) == given
+    given = limits().model_dump()
+    lines = [f"{k} = {v!r}" for k, v in given.items() if not isinstance(v, dict)]
+    for table in ("segment", "capacity", "own"):
+        lines += [f"[{table}]", *(f"{k} = {v!r}" for k, v in given[table].items())]
+    path.write_text("\n".join(lines).replace("True", "true"))
+    assert Limits.from_toml(path) == limits()
 
 
 def test_limits_in_the_documentation_are_valid(tmp_path):
@@ -147,8 +158,13 @@ def test_limits_in_the_documentation_are_valid(tmp_path):
         ({}, "at least one limit"),
         (dict(gasket_opening=6e-3), "gasket_offset must be given where gasket_opening is"),
         (dict(gasket_offset=0.1), "gasket_opening must be given where gasket_offset is"),
-        (dict(segment=section()), "capacity must be given where segment is"),
+        (dict(segment=section()), "capacity or crack_width must be given where segment is"),
         (dict(convergence_per_mille=0.0), "greater than 0"),
+        (dict(crack_width=2e-4, crack_duration="long-term"), "segment must be given where crack_width is"),
+        (dict(crack_width=2e-4, segment=section()), "crack_duration must be given where crack_width is"),
+        (dict(joint_contact_height=0.2), "capacity must be given where joint_contact_height is"),
+        (dict(own=dict(joint_turn=1.0)), "must name quantities of a response, got 'joint_turn'"),
+        (dict(own=dict(settlement=-1.0)), "settlement must be greater than 0, got -1"),
         (dict(opening=1.0), "unknown key, got 1.0; did you mean 'gasket_opening'"),
     ],
 )
@@ -165,11 +181,24 @@ def test_responses_that_lack_something_are_refused(response):
     with pytest.raises(ValueError, match="attribute 'ring'"):
         check(response.drop_attrs(), limits())
     unjointed = BeamSpringLining(ring(joint_angles=())).respond(pressures())
-    with pytest.raises(ValueError, match="limits of joints need a ring with joints"):
-        check(unjointed, limits())
-    assert "section_utilisation" in check(
-        unjointed, limits(gasket_opening=None, gasket_offset=None, joint_dislocation=None)
-    )
+    assert "section_utilisation" in check(unjointed, Limits(segment=section(), capacity=CapacityRule(**RULE)))
+
+
+@pytest.mark.parametrize(
+    ("lining", "given", "message"),
+    [
+        (dict(joint_angles=()), dict(joint_dislocation=5e-3), "joint_dislocation must be left out of a ring without"),
+        (dict(joint_angles=()), dict(own=dict(joint_rotation=5e-3)), "joint_rotation must be left out of a ring"),
+        ({}, dict(gasket_opening=6e-3, gasket_offset=0.2), "gasket_offset must be at most half the thickness 0.35 m"),
+        ({}, dict(joint_contact_height=0.4), "joint_contact_height must be at most the thickness 0.35 m, got 0.4 m"),
+        (dict(joint_contact_height=0.3), dict(joint_contact_height=0.2), "of the ring, 0.3 m, got 0.2 m; correct one"),
+        ({}, dict(segment=section(cover_outer=0.18)), "cover_outer and half of bar_diameter_outer must be below half"),
+    ],
+)
+def test_limits_that_do_not_fit_a_ring_are_refused(lining, given, message):
+    of_segment = dict(segment=section(), capacity=CapacityRule(**RULE))
+    with pytest.raises(ValueError, match=message):
+        Limits(**of_segment | given).check_ring(ring(**lining))
 
 
 def test_figure_shows_the_numbers_of_the_dataset(checked):
@@ -180,9 +209,9 @@ def test_figure_shows_the_numbers_of_the_dataset(checked):
     assert clouds[:, 0].max() == pytest.approx(checked["design_bending_moment"].max().item() / 1e3)
     assert history.get_xlabel() == "inflow mass [kg/m]"
     labels = {line.get_label(): line for line in history.lines}
-    for name, label in UTILISATIONS.items():
-        largest = checked[name].max([d for d in checked[name].dims if d != "time"])
-        np.testing.assert_array_equal(labels[label].get_ydata(), largest)
+    for name in CHECKED:
+        label, largest = UTILISATIONS[name], checked[name].max([d for d in checked[name].dims if d != "time"])
+        np.testing.assert_array_equal(labels[label].get_ydata(), np.where(np.isfinite(largest), largest, np.nan))
 
 
 def test_figure_of_a_single_state_without_section(response, tmp_path):
