@@ -8,6 +8,7 @@ from coupling.commands.compare import compare_command
 from coupling.commands.export import export_command
 from coupling.commands.info import info_command
 from coupling.commands.joined import JoinedCommands
+from coupling.commands.misfit import misfit_command
 from coupling.commands.plan import plan_command
 from coupling.commands.report import report_command
 from coupling.commands.rerun import rerun_command
@@ -30,6 +31,7 @@ app.command("rerun")(rerun_command)
 app.command("plan")(plan_command)
 app.command("respond")(respond_command)
 app.command("compare")(compare_command)
+app.command("misfit")(misfit_command)
 app.command("scenes")(scenes_command)
 app.command("report")(report_command)
 app.command("export")(export_command)

@@ -9,7 +9,7 @@ from rich.table import Table
 
 from coupling.commands.exit_codes import JsonPath, answering, say
 from coupling.commands.options import SOURCE, RingScene
-from coupling.refused import Refused
+from coupling.commands.own_folder import claim
 
 FOLDER, DIFFERENCES = "comparison", "differences.nc"
 
@@ -30,13 +30,15 @@ def store(comparison, source, out=None):
     from coupling.datasets import write_dataset
     from coupling.figures import RESOLUTION
     from coupling.figures.comparison import forces_compared, joints_compared
+    from coupling.responses.comparison import TITLE
 
     folder = source.file.parent / FOLDER if out is None else out
     if source.tunnel is not None:
         folder = folder / f"tunnel-{source.tunnel}"
     path = folder / DIFFERENCES
     responses = {name: folder / f"{name}.nc" for name in comparison.responses}
-    _claim(folder, (path, *responses.values(), folder / "forces.png", folder / "joints.png"))
+    files = (path, *responses.values(), folder / "forces.png", folder / "joints.png")
+    claim(folder, files, DIFFERENCES, TITLE)
     write_dataset(path, comparison.differences)
     for name, response in comparison.responses.items():
         write_dataset(responses[name], response)
@@ -56,22 +58,6 @@ def store(comparison, source, out=None):
         "responses": {name: str(file) for name, file in responses.items()},
         "figures": figures,
     }
-
-
-def _claim(folder, files):
-    """Make the folder; refuse one in which a file would be replaced that no earlier comparison wrote."""
-    from coupling.datasets import stored_title
-    from coupling.responses.comparison import TITLE
-
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except FileExistsError:
-        raise Refused(f"output folder '{folder}': it, or one above it, is a file; choose another --out") from None
-    there = [file.name for file in files if file.exists()]
-    if there and not stored_title(folder / DIFFERENCES).startswith(TITLE):
-        raise Refused(
-            f"output folder '{folder}': holds {there[0]}, which is not of an earlier comparison; choose another --out"
-        )
 
 
 def compare_command(
