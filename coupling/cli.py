@@ -15,11 +15,11 @@ from coupling.commands.rerun import rerun_command
 from coupling.commands.respond import respond_command
 from coupling.commands.run import run_command
 from coupling.commands.scenes import scenes_command
+from coupling.commands.schema import schema_command
 from coupling.commands.study import study_command
 
 app = typer.Typer(
     cls=JoinedCommands,
-    add_completion=False,
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -33,6 +33,7 @@ app.command("respond")(respond_command)
 app.command("compare")(compare_command)
 app.command("misfit")(misfit_command)
 app.command("scenes")(scenes_command)
+app.command("schema")(schema_command)
 app.command("report")(report_command)
 app.command("export")(export_command)
 app.command("info")(info_command)
