@@ -17,6 +17,7 @@ from coupling.commands.run import run_command
 from coupling.commands.scenes import scenes_command
 from coupling.commands.schema import schema_command
 from coupling.commands.study import study_command
+from coupling.commands.watch import watch_command
 
 app = typer.Typer(
     cls=JoinedCommands,
@@ -27,6 +28,7 @@ app = typer.Typer(
     epilog="Exit codes: 0 done, 1 rerun differs, 2 refused input, 3 run failed, 130 interrupted.",
 )
 app.command("run")(run_command)
+app.command("watch")(watch_command)
 app.command("rerun")(rerun_command)
 app.command("plan")(plan_command)
 app.command("respond")(respond_command)

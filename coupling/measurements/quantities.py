@@ -95,6 +95,8 @@ def computed(run: Run, quantity: str, model: str | None = None, tunnel: int | No
     with opened(run) as file:
         pressures = read_pressures(file)
         there = pressures.sizes.get("tunnel", 1)
+        if QUANTITIES[quantity].of_tunnel and "soil_pressure" not in pressures:
+            raise Refused(f"{quantity}: needs a tunnel, the run has none; leave the line out")
         if tunnel is not None and tunnel >= there:
             raise Refused(f"tunnel: must be one of the run's {there}, counted from 0, got {tunnel}; correct it")
         return QUANTITIES[quantity].read(file, model, None if tunnel == gate_tunnel(pressures) else tunnel)

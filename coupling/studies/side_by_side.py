@@ -71,8 +71,8 @@ def side_by_side(runs: Sequence[str | Path], along: str = "inflow_mass", records
     Raises
     ------
     Refused
-        Fewer than two, the same one twice, another `along`, a run without a record, or one that did not get beyond the
-        initial state.
+        Fewer than two, the same one twice, another `along`, a run without a record or a tunnel, or one that did
+        not get beyond the initial state.
     RunFileError, SceneError
         A run, or the scene in it, cannot be read.
     """
@@ -111,10 +111,13 @@ def _read(run):
         history, attributes = read_history(file), read_attributes(file)
         if not history.sizes["time"]:
             raise Refused(f"run '{file.path}': must hold a record to compare, it has none; wait for the first one")
+        pressures = on_tunnel(read_pressures(file))
+        if "soil_pressure" not in pressures:
+            raise Refused(f"run '{file.path}': must have a tunnel to be compared, it has none; leave it out")
         return {
             "file": file.path,
             "history": history,
-            "pressures": on_tunnel(read_pressures(file)),
+            "pressures": pressures,
             "responses": {model: read_response(file, model) for model in file.models()},
             "attributes": attributes,
             "scene": parse_scene(attributes["scene"], str(file.path)),
