@@ -7,6 +7,7 @@ import typer
 from coupling.commands.compare import compare_command
 from coupling.commands.export import export_command
 from coupling.commands.info import info_command
+from coupling.commands.init import init_command
 from coupling.commands.joined import JoinedCommands
 from coupling.commands.misfit import misfit_command
 from coupling.commands.plan import plan_command
@@ -35,6 +36,7 @@ app.command("respond")(respond_command)
 app.command("compare")(compare_command)
 app.command("misfit")(misfit_command)
 app.command("scenes")(scenes_command)
+app.command("init")(init_command)
 app.command("schema")(schema_command)
 app.command("report")(report_command)
 app.command("export")(export_command)
