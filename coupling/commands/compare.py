@@ -9,9 +9,11 @@ from rich.table import Table
 
 from coupling.commands.exit_codes import JsonPath, answering, say
 from coupling.commands.options import SOURCE, RingScene
+from coupling.commands.own_folder import claim
 from coupling.refused import Refused
 
 FOLDER, DIFFERENCES = "comparison", "differences.nc"
+STATES, REPORT_FILE = "runs.nc", "report.html"
 
 
 def store(comparison, source, out=None):
@@ -30,13 +32,15 @@ def store(comparison, source, out=None):
     from coupling.datasets import write_dataset
     from coupling.figures import RESOLUTION
     from coupling.figures.comparison import forces_compared, joints_compared
+    from coupling.responses.comparison import TITLE
 
     folder = source.file.parent / FOLDER if out is None else out
     if source.tunnel is not None:
         folder = folder / f"tunnel-{source.tunnel}"
     path = folder / DIFFERENCES
     responses = {name: folder / f"{name}.nc" for name in comparison.responses}
-    _claim(folder, (path, *responses.values(), folder / "forces.png", folder / "joints.png"))
+    files = (path, *responses.values(), folder / "forces.png", folder / "joints.png")
+    claim(folder, files, DIFFERENCES, TITLE)
     write_dataset(path, comparison.differences)
     for name, response in comparison.responses.items():
         write_dataset(responses[name], response)
@@ -58,72 +62,128 @@ def store(comparison, source, out=None):
     }
 
 
-def _claim(folder, files):
-    """Make the folder; refuse one in which a file would be replaced that no earlier comparison wrote."""
-    from coupling.datasets import stored_title
-    from coupling.responses.comparison import TITLE
+def store_runs(compared, folder):
+    """Write the states of runs side by side, and at equal inflow mass the page about them; returns a dict of paths."""
+    from coupling.datasets import write_dataset
+    from coupling.report.page import write_runs_report
+    from coupling.studies.side_by_side import TITLE
 
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except FileExistsError:
-        raise Refused(f"output folder '{folder}': it, or one above it, is a file; choose another --out") from None
-    there = [file.name for file in files if file.exists()]
-    if there and not stored_title(folder / DIFFERENCES).startswith(TITLE):
-        raise Refused(
-            f"output folder '{folder}': holds {there[0]}, which is not of an earlier comparison; choose another --out"
-        )
+    data, page = folder / STATES, folder / REPORT_FILE
+    claim(folder, (data, page), STATES, TITLE)
+    write_dataset(data, compared.dataset())
+    # the slider of the page moves along the inflow mass
+    report = str(write_runs_report(compared, page)) if compared.along == "inflow_mass" else None
+    return {"data": str(data), "report": report}
 
 
 def compare_command(
-    run: Annotated[Path, typer.Argument(help=SOURCE)],
-    first: Annotated[str, typer.Option(help="Lining model, as for gush respond.")] = "beam-spring",
-    second: Annotated[str, typer.Option(help="Lining model that is compared with it.")] = "continuum",
+    runs: Annotated[
+        list[Path],
+        typer.Argument(help=f"{SOURCE} Of one both lining models are compared, several are compared with each other."),
+    ],
+    first: Annotated[
+        str | None, typer.Option(help="Of one run: lining model, as for gush respond; beam-spring when left out.")
+    ] = None,
+    second: Annotated[
+        str | None, typer.Option(help="Of one run: lining model compared with it; continuum when left out.")
+    ] = None,
     open_gate: Annotated[
         float | None,
-        typer.Option(help="Cut the gate out of a continuum ring over this share of the tunnel's length (1: a slot)."),
+        typer.Option(
+            help="Of one run: cut the gate out of a continuum ring over this share of the tunnel's length (1: a slot)."
+        ),
     ] = None,
     scene: RingScene = None,
-    out: Annotated[Path | None, typer.Option(help="Folder for differences and figures; beside RUN when left out.")] = (
-        None
-    ),
+    along: Annotated[
+        str | None,
+        typer.Option(help="Of several runs: equal inflow_mass or equal time; inflow_mass, with a page, when left out."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for the results; comparison beside RUN, of several runs runs/compared, when left out."
+        ),
+    ] = None,
     json_path: JsonPath = None,
 ):
-    """Compare two lining models over the whole event: largest differences with place, time and cause; figures.
+    """Compare two lining models on one run, or several runs: largest differences with place and time; figures, a page.
 
-    Nothing in RUN changes. JSON: `run`, `models`, `cpu_seconds`, `rows` (see `coupling.responses.comparison.compare`),
-    `differences`, `responses`, `figures` (paths); of several tunnels that with the gate, the others under `tunnels`.
+    Nothing in the runs changes. JSON of one: `run`, `models`, `cpu_seconds`, `rows` (see
+    `coupling.responses.comparison.compare`), `differences`, `responses`, `figures` (paths); of several tunnels that
+    with the gate, the others under `tunnels`. JSON of several: `runs`, `names`, `along`, `to` (the last state),
+    `model`, `rows` (the same with `run`, each less the first run), `data`, `report` (paths).
     """
     with answering(json_path) as answer:
-        from coupling.responses.comparison import compare
-        from coupling.responses.source import read_sources
+        of_models = {"--first": first, "--second": second, "--open-gate": open_gate, "--scene": scene}
+        several = len(runs) > 1
+        given = [name for name, value in (of_models if several else {"--along": along}).items() if value is not None]
+        if given:
+            of = "one run" if several else "several runs"
+            raise Refused(f"{given[0]}: is for comparing {of}, got {len(runs)}; leave it out")
+        if several:
+            data = _compare_runs(runs, along or "inflow_mass", out)
+            if answer(data):
+                for name in data["names"][1:]:
+                    rows = [row for row in data["rows"] if row["run"] == name]
+                    Console().print(_differences_table(rows, f"{name} less {data['names'][0]}"))
+                say(f"results in {Path(data['data']).parent}")
+        else:
+            data = _compare_models(runs[0], first or "beam-spring", second or "continuum", open_gate, scene, out)
+            if answer(data):
+                _print_models(data)
 
-        found = {}
-        for source in read_sources(run, scene):
-            # the gate is in one tunnel only
-            comparison = compare(source, first, second, open_gate if source.tunnel is None else None)
-            found[source.tunnel] = store(comparison, source, out)
-        others = {tunnel: one for tunnel, one in found.items() if tunnel is not None}
-        data = {"run": str(run), **found[None], **({"tunnels": others} if others else {})}
-        if answer(data):
-            for tunnel, one in found.items():
-                Console().print(_comparison_table(one, tunnel))
-                times = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in one["cpu_seconds"].items())
-                say(f"CPU time for {one['times']} times: {times}")
-                say(f"results in {Path(one['differences']).parent}")
+
+def _compare_runs(runs, along, out):
+    from coupling.studies.side_by_side import side_by_side
+
+    compared = side_by_side(runs, along)
+    states = compared.states[0]
+    return {
+        "runs": [str(run) for run in runs],
+        "names": [case.parameters["run"] for case in compared.cases],
+        "along": along,
+        "to": float(states[along][-1]),
+        "model": str(states["model"].values[0]) if "model" in states.dims else None,
+        "rows": compared.rows,
+        **store_runs(compared, Path("runs") / "compared" if out is None else out),
+    }
 
 
-def _comparison_table(data, tunnel=None):
-    first, second = data["models"]
-    table = Table("quantity", "largest difference", "of the extreme", "where", "when", "known cause")
-    table.title = f"{second} less {first}{'' if tunnel is None else f', tunnel {tunnel}'}"
-    for row in data["rows"]:
-        where = f"joint {row['joint']}" if row["joint"] is not None else f"{row['theta']:.4g} deg"
-        table.add_row(
+def _compare_models(run, first, second, open_gate, scene, out):
+    from coupling.responses.comparison import compare
+    from coupling.responses.source import read_sources
+
+    found = {}
+    for source in read_sources(run, scene):
+        # the gate is in one tunnel only
+        comparison = compare(source, first, second, open_gate if source.tunnel is None else None)
+        found[source.tunnel] = store(comparison, source, out)
+    others = {tunnel: one for tunnel, one in found.items() if tunnel is not None}
+    return {"run": str(run), **found[None], **({"tunnels": others} if others else {})}
+
+
+def _print_models(data):
+    for tunnel, one in {None: data, **data.get("tunnels", {})}.items():
+        first, second = one["models"]
+        of = "" if tunnel is None else f", tunnel {tunnel}"
+        Console().print(_differences_table(one["rows"], f"{second} less {first}{of}"))
+        times = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in one["cpu_seconds"].items())
+        say(f"CPU time for {one['times']} times: {times}")
+        say(f"results in {Path(one['differences']).parent}")
+
+
+def _differences_table(rows, title):
+    causes = any(row["cause"] for row in rows)
+    heads = ("quantity", "largest difference", "of the extreme", "where", "when")
+    table = Table(*heads, *(("known cause",) if causes else ()), title=title)
+    for row in rows:
+        angle = "-" if row["theta"] is None else f"{row['theta']:.4g} deg"
+        cells = (
             row["label"],
             f"{row['difference'] * row['scale']:+.3g} {row['unit']}",
             f"{100 * row['relative']:.2f} %",
-            where,
+            angle if row["joint"] is None else f"joint {row['joint']}",
             f"{row['time']:.3g} s",
-            row["cause"] or "-",
         )
+        table.add_row(*cells, *((row["cause"] or "-",) if causes else ()))
     return table

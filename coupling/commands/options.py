@@ -1,11 +1,30 @@
 """Arguments and options that several commands take."""
 
+import glob
+import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-SceneName = Annotated[str, typer.Argument(help="A built-in scene (see `gush scenes`) or a TOML file.")]
+
+def completed(room: str) -> Callable[[str], list[str]]:
+    """Completion of a name that a room of `coupling` has built in, or of a path."""
+
+    def complete(incomplete: str) -> list[str]:
+        from coupling.scenes.layers import ready_names
+
+        paths = (f"{path}/" if os.path.isdir(path) else path for path in glob.glob(f"{glob.escape(incomplete)}*"))
+        return [*(name for name in ready_names(room) if name.startswith(incomplete)), *sorted(paths)]
+
+    return complete
+
+
+SceneName = Annotated[
+    str,
+    typer.Argument(help="A built-in scene (see `gush scenes`) or a TOML file.", autocompletion=completed("scenes")),
+]
 SOURCE = "Folder or run.nc of a run, or a netCDF-4 file with pressures that follow the schema."
 RingScene = Annotated[
     str | None, typer.Option("--scene", help="Scene whose ring is taken; that of the run when left out.")

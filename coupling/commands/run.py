@@ -10,14 +10,18 @@ from rich.table import Table
 
 from coupling.commands.events import EventStream
 from coupling.commands.exit_codes import JsonPath, answering, checked_json, say, warn
-from coupling.commands.options import Changes, Quiet, Threads
+from coupling.commands.options import Changes, Quiet, Threads, completed
 from coupling.commands.tables import limits_table, response_table
 from coupling.runs.progress_line import ProgressLine
 
 
 def run_command(
     scene: Annotated[
-        str | None, typer.Argument(help="A built-in scene (see `gush scenes`) or a TOML file; quick when left out.")
+        str | None,
+        typer.Argument(
+            help="A built-in scene (see `gush scenes`) or a TOML file; quick when left out.",
+            autocompletion=completed("scenes"),
+        ),
     ] = None,
     changes: Changes = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the run; runs/SCENE, numbered, when left out.")] = None,

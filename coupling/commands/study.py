@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from coupling.commands.exit_codes import FAILED, JsonPath, answering, say
+from coupling.commands.options import completed
 from coupling.studies.limits import HEADS, limit_rows
 from structure.response import SHOWN
 
@@ -17,7 +18,8 @@ def study_command(
         str,
         typer.Argument(
             help="A built-in study (table-2, sensitivity, permeability, mesh, backend), a TOML file, or the folder "
-            "of a study that is to go on."
+            "of a study that is to go on.",
+            autocompletion=completed("studies"),
         ),
     ],
     out: Annotated[

@@ -8,12 +8,15 @@ from __future__ import annotations
 import contextlib
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from coupling.datasets import run_file
 from coupling.files.folder import REPORT_FILE, RUN_FILE
 from coupling.files.replace import replace_file
 from coupling.refused import Refused
+
+if TYPE_CHECKING:
+    from coupling.studies.side_by_side import SideBySide
 
 MARK = '<meta name="generator" content="gushing report">'
 SCRIPTS = ("data.js", "charts.js", "ground.js", "tables.js", "player.js")
@@ -58,6 +61,25 @@ def write_report(path: str | Path, out: str | Path | None = None, model: str | N
         target = _checked_path(folder, out)
         shown = study_page.collect(folder, target.parent, model)
     replace_file(target, rendered(shown))
+    return target
+
+
+def write_runs_report(compared: SideBySide, out: str | Path) -> Path:
+    """Write the page about runs side by side.
+
+    Parameters
+    ----------
+    compared : coupling.studies.side_by_side.SideBySide
+        Along the inflow mass.
+    out : str or path
+        The HTML file; an earlier report is replaced, nothing else.
+
+    Raises Refused: as :func:`write_report`.
+    """
+    from coupling.report import study_page
+
+    target = _checked_path(Path(out).parent, out)
+    replace_file(target, rendered(study_page.collect_runs(compared, target.parent)))
     return target
 
 
@@ -160,4 +182,4 @@ def is_report(path: str | Path) -> bool:
         return MARK.encode() in stream.read(1000)
 
 
-__all__ = ["is_report", "rendered", "study_folder", "write_report", "write_run_reports"]
+__all__ = ["is_report", "rendered", "study_folder", "write_report", "write_run_reports", "write_runs_report"]

@@ -55,7 +55,7 @@ def collect(folder, beside, model=None):
     whole = {case.index: _loaded(files[case.index], models) for case in found if files[case.index].is_file()}
     answers = {number: ring_series(states) for number, states in whole.items()}
     rows = [_row(case, whole.get(case.index), answers.get(case.index), failures.get(case.key),
-                 files[case.index].parent, Path(beside)) for case in found]  # fmt: skip
+                 files[case.index].parent / RUN_FOLDER, Path(beside)) for case in found]  # fmt: skip
     done, lost = ([row for row in rows if (row["status"] == "finished") == good] for good in (True, False))
     drawn = [case for case in found if case.index in whole and last_record(whole[case.index]) is not None]
     chosen = [drawn[k] for k in evenly(len(drawn), MOST_CASES)] if drawn else []
@@ -73,6 +73,7 @@ def collect(folder, beside, model=None):
         "notes": notes,
         "attributes": attributes,
         "made": f"first case of {attributes['created']}" if "created" in attributes else "",
+        "design_title": "Design of the study",
         "design": _design(plan, found, len(done), sum(row["status"] == "failed" for row in lost)),
         "scene_of_cases": _shared_facts(found),
         "lost": lost,
@@ -82,6 +83,44 @@ def collect(folder, beside, model=None):
         "trust": _trust(done),
         "player": player,
     }  # fmt: skip
+
+
+def collect_runs(compared, beside):
+    """Everything that the page about runs side by side shows: they are the cases.
+
+    Parameters
+    ----------
+    compared : coupling.studies.side_by_side.SideBySide
+        Along the inflow mass.
+    beside : path
+        Folder of the page.
+    """
+    whole = {case.index: shape_of_ring(states) for case, states in zip(compared.cases, compared.states, strict=True)}
+    answers = {number: ring_series(states) for number, states in whole.items()}
+    done = [_row(case, whole[case.index], answers[case.index], None, file.parent, Path(beside))
+            for case, file in zip(compared.cases, compared.files, strict=True)]  # fmt: skip
+    chosen = [compared.cases[k] for k in evenly(len(compared.cases), MOST_CASES)]
+    records = whole[0].sizes["progress"]
+    player, notes = _player(whole, answers, chosen, records)
+    design = [(case.parameters["run"], str(file)) for case, file in zip(compared.cases, compared.files, strict=True)]
+    last = shown(float(whole[0]["inflow_mass"][-1]))
+    return {
+        "title": f"Gushing into a tunnel: {len(done)} runs side by side",
+        "lead": f"Compared at equal inflow mass, to {last} kg/m, which all of them reached.",
+        "status": ("finished", f"{len(done)} runs"),
+        "warnings": _warnings(done, []),
+        "notes": notes,
+        "attributes": whole[0].attrs,
+        "made": f"first run of {whole[0].attrs.get('created', 'unknown time')}",
+        "design_title": "What is compared",
+        "design": [*design, ("compared at", f"{records} inflow masses")],
+        "scene_of_cases": _shared_facts(compared.cases),
+        "lost": [],
+        "done": done,
+        "table": _table(done),
+        "trust": _trust(done),
+        "player": player,
+    }
 
 
 def _player(whole, answers, chosen, available):
@@ -135,8 +174,8 @@ def _loaded(file, models):
         raise StudyError(unreadable(file, error)) from None
 
 
-def _row(case, states, answers, failure, folder, beside):
-    run = folder / RUN_FOLDER
+def _row(case, states, answers, failure, run, beside):
+    """A case; `run`: folder of its run, `beside`: that of the page."""
     status = "finished" if states is not None else "not run" if failure is None else "failed"
     seconds = _wall_seconds(run)
     there = {name: run / name for name in ("", REPORT_FILE, LOG_FILE) if (run / name).exists()}

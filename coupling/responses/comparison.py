@@ -1,7 +1,7 @@
 """Two lining models under the same pressures: differences through the event, the largest ones with their cause."""
 
 import time as clock
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -10,7 +10,7 @@ from coupling.datasets.geometry import gate_of
 from coupling.files.provenance import origin, with_history
 from coupling.refused import Refused
 from coupling.responses.respond import respond_by_name
-from structure.response import RESPONSE, SHOWN
+from structure.response import RESPONSE, SHOWN, Shown
 
 TITLE = "differences between lining models"
 #: Forces, displacements and joints.
@@ -80,10 +80,11 @@ def compare(source, first="beam-spring", second="continuum", open_gate=None):
         if differences[name].size == 0:
             continue
         known = name in OFFSETS and {first, second} == {"beam-spring", "continuum"}
-        rows.append(_row(name, differences[name], responses[first], CURVED_SECTION if known else ""))
+        told, reference = SHOWN[name], responses[first]
+        rows.append(largest_difference(name, differences[name], reference, told, CURVED_SECTION if known else ""))
         if known:
             rest = differences[f"{name}_beyond_offset"]
-            rows.append(_row(name, rest, responses[first], "", ", curved section apart"))
+            rows.append(largest_difference(name, rest, reference, told, suffix=", curved section apart"))
     return Comparison(responses, differences, rows, seconds)
 
 
@@ -140,23 +141,29 @@ def _differences(first, second, ring):
     return dataset
 
 
-def _row(name, difference, first, cause, suffix=""):
-    """The largest difference of one quantity, where and when."""
-    shown = SHOWN[name]
+def largest_difference(
+    name: str, difference: xr.DataArray, reference: xr.Dataset, shown: Shown, cause: str = "", suffix: str = ""
+) -> dict[str, Any]:
+    """The largest difference of one quantity, where and when: a row of :class:`Comparison`.
+
+    difference : (time or progress[, theta or joint]), known somewhere;  reference : what it is a difference to, with
+    `name` in it and `time`, and `inflow_mass` where there is one.
+    """
     values = difference.values
-    time, place = np.unravel_index(np.nanargmax(np.abs(values)), values.shape)
-    extreme = float(np.nanmax(np.abs(first[name].values)))
-    along_joints = difference.dims[1] == "joint"
+    record, *place = np.unravel_index(np.nanargmax(np.abs(values)), values.shape)
+    at = dict(zip(difference.dims[1:], place, strict=True))
+    extreme = float(np.nanmax(np.abs(reference[name].values)))
+    largest = float(values[record, *place])
     return {
         "name": name,
         "label": shown.short + suffix,
         "unit": shown.unit,
         "scale": shown.scale,
-        "difference": float(values[time, place]),
-        "relative": abs(float(values[time, place])) / extreme if extreme else float(values[time, place] != 0),
-        "theta": None if along_joints else float(first["theta"][place]),
-        "joint": int(first["joint"][place]) if along_joints else None,
-        "time": float(first["time"][time]),
-        "inflow_mass": float(first["inflow_mass"][time]) if "inflow_mass" in first else None,
+        "difference": largest,
+        "relative": abs(largest) / extreme if extreme else float(largest != 0),
+        "theta": float(reference["theta"][at["theta"]]) if "theta" in at else None,
+        "joint": int(reference["joint"][at["joint"]]) if "joint" in at else None,
+        "time": float(reference["time"][record]),
+        "inflow_mass": float(reference["inflow_mass"][record]) if "inflow_mass" in reference else None,
         "cause": cause,
     }

@@ -76,8 +76,8 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, 
     return str(done)
 
 
-def at_inflow_masses(pressures, history, responses, masses):
-    """States of a run at fixed inflow masses; NaN beyond what the run reached.
+def at_inflow_masses(pressures, history, responses, masses, along="inflow_mass"):
+    """States of a run at fixed inflow masses, or times; NaN beyond what the run reached.
 
     Parameters
     ----------
@@ -86,7 +86,8 @@ def at_inflow_masses(pressures, history, responses, masses):
     responses : dict of str to xarray.Dataset
         By lining model.
     masses : (n,) float64
-        [kg/m], ascending from 0, the initial state.
+        [kg/m], ascending from 0, the initial state; along "time" [s].
+    along : {"inflow_mass", "time"}
 
     Returns
     -------
@@ -103,7 +104,7 @@ def at_inflow_masses(pressures, history, responses, masses):
     from coupling.postprocess.quality import quality
     from structure.limits import CHECK_VARIABLES
 
-    reached, unique = _times(history, masses)
+    reached, unique = _times(history[along].values, history["time"].values, masses)
     parts = [_at(pressures[["soil_pressure", "water_pressure", "soil_shear"]], reached)]
     parts.append(_at(history[[name for name in PROGRESS if name != "time" and name in history]], reached))
     if responses:
@@ -113,9 +114,12 @@ def at_inflow_masses(pressures, history, responses, masses):
         parts.append(xr.concat(models, dim=xr.IndexVariable("model", list(responses)), join="outer"))
     result = xr.merge(parts, compat="no_conflicts", join="outer")
     share = masses / max(masses[-1], 1e-300)
+    mass = masses
+    if along == "time":
+        mass = _at(history.reset_coords("inflow_mass")[["inflow_mass"]], reached)["inflow_mass"].values
     result = result.assign_coords(
-        progress=("progress", share, {"units": "1", "long_name": "share of the last inflow mass"}),
-        inflow_mass=("progress", masses, {"units": "kg/m", "long_name": "grains inside the tunnel"}),
+        progress=("progress", share, {"units": "1", "long_name": f"share of the last {along.replace('_', ' ')}"}),
+        inflow_mass=("progress", mass, {"units": "kg/m", "long_name": "grains inside the tunnel"}),
     )
     about = {"units": "s", "long_name": "time since the gate opened"}
     result["time"] = ("progress", np.where(unique, reached, np.nan), about)
@@ -143,9 +147,8 @@ def _limits(response):
     return found
 
 
-def _times(history, masses):
+def _times(inflow, time, masses):
     """Time at which each inflow mass was first reached, and whether it was."""
-    inflow, time = history["inflow_mass"].values, history["time"].values
     highest = np.maximum.accumulate(inflow)
     known = masses <= highest[-1] * (1 + 1e-12)
     reached = np.empty(len(masses))

@@ -16,8 +16,8 @@ FORBIDDEN = {
 }
 #: Rooms of `coupling`: each imports only itself and those before it; the command line is last.
 ROOMS = (
-    "refused", "scenes", "files", "datasets", "postprocess", "responses", "figures", "export", "runs", "studies",
-    "report", "commands", "cli",
+    "refused", "scenes", "files", "datasets", "postprocess", "responses", "measurements", "figures", "export", "runs",
+    "studies", "report", "commands", "cli",
 )  # fmt: skip
 #: The same of `verification`.
 MEASURING = (

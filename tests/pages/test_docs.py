@@ -34,7 +34,7 @@ TUTORIAL = "docs/tutorial.md"
 TITLE = re.compile(r'title="([^"]*)"')
 NOT_RUN = re.compile(r"not run by the tests: \S.*")
 FILE_NAME = re.compile(r"[\w.-]+")
-#: Languages of blocks that are shown, not executed.
+#: Languages of blocks that are shown, not executed; with a title they are saved for the page.
 SHOWN = ("text",)
 
 
@@ -94,12 +94,17 @@ def execute(words, place):
     assert not code, f"{place}: {shlex.join(words)}: exit code {code}"
 
 
+def save(block):
+    """Write a block into the file that its title names, for the page."""
+    assert FILE_NAME.fullmatch(block.title), f"{block.place}: title must be a file name, got {block.title!r}"
+    Path(block.title).write_text(block.text, encoding="utf-8")
+
+
 def read_toml(block):
-    """A TOML block must mean something: scene, study or limits; a file name as title saves it for the page."""
+    """A TOML block must mean something: scene, study or limits; with a title it is saved for the page."""
     data = tomllib.loads(block.text)
     if block.title:
-        assert FILE_NAME.fullmatch(block.title), f"{block.place}: title must be a file name, got {block.title!r}"
-        Path(block.title).write_text(block.text, encoding="utf-8")
+        save(block)
     if "parameters" in data:
         from coupling.studies.cases import cases
         from coupling.studies.design import load_study
@@ -118,6 +123,8 @@ def follow(page):
     names = {"__name__": "__main__"}
     for block in blocks(page):
         if block.language in SHOWN:
+            if block.title:
+                save(block)
             continue
         if block.language == "bash":
             for words in command_lines(block.text):

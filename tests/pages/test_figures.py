@@ -9,6 +9,7 @@ import xarray as xr
 
 from coupling import datasets, figures
 from coupling.files.provenance import root_attributes
+from coupling.measurements import misfit
 from coupling.responses.respond import respond
 from verification.synthetic_run import TwoTriangles, make_quick_scene, record
 
@@ -130,3 +131,14 @@ def test_all_pictures_of_a_run_are_written(run, tmp_path):
 def test_drawing_leaves_pyplot_alone():
     code = "import sys, coupling.figures; sys.exit('matplotlib.pyplot' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_residuals_are_drawn_in_errors_and_values_in_the_units_shown(run):
+    given = datasets.read_response(run)[["convergence_vertical"]].reset_coords("inflow_mass", drop=True)
+    given["convergence_vertical_error"] = ((), 1e-4, {"units": "m"})
+    given["convergence_vertical"] = given["convergence_vertical"].copy(data=given["convergence_vertical"] - 3e-4)
+    found = misfit(run, given)
+    values, left = figures.residuals(found).axes
+    assert values.get_ylabel() == "convergence vertical [mm]" and "χ² 9 a measurement" in left.get_title(loc="right")
+    np.testing.assert_allclose(line(values, "computed").get_ydata(), 1e3 * found["computed"])
+    np.testing.assert_allclose(left.lines[-1].get_ydata(), 3.0, rtol=1e-6)

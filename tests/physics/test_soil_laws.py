@@ -36,10 +36,13 @@ def test_every_law_of_the_page_is_there_with_its_keys():
 
 
 @pytest.mark.slow
-def test_law_of_the_page_runs_and_wears(tmp_path):
+def test_law_of_the_page_runs_and_wears(tmp_path, monkeypatch):
+    monkeypatch.setattr("mpm.laws.law._REGISTERED", {})  # another test may have run the page
     example, use = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.S)
     names = {}
-    exec(example + use, names)  # the page is ours
+    for _ in range(2):  # as a cell of a notebook is run again
+        exec(example + use, names)  # the page is ours
+    assert isinstance(names["scene"].soils[0], names["WearingSand"])
     scene = names["scene"].changed(
         discretisation=COARSE, stop={"time": 0.06}, output={"interval": 0.02, "snapshot_interval": 0.06}, ring="none"
     )
