@@ -9,7 +9,6 @@ from rich.table import Table
 
 from coupling.commands.exit_codes import FAILED, JsonPath, answering, say
 from coupling.commands.options import completed
-from coupling.studies.limits import HEADS, limit_rows
 from structure.response import SHOWN
 
 
@@ -68,6 +67,8 @@ def _study_table(data):
 
 
 def _limits_table(data):
+    from coupling.studies.limits import HEADS, limit_rows
+
     table = Table(*HEADS)
     for row in limit_rows(data["limits"], {case["case"]: case["name"] for case in data["cases"]}):
         table.add_row(*row)

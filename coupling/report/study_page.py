@@ -118,6 +118,7 @@ def collect_runs(compared, beside):
         "lost": [],
         "done": done,
         "table": _table(done),
+        "limits": _limits(done, whole, str(whole[0]["model"].values[0]) if "model" in whole[0].dims else None),
         "trust": _trust(done),
         "player": player,
     }

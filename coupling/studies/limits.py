@@ -26,7 +26,8 @@ def limits_of_case(case: xr.Dataset, model: str | None) -> dict[str, dict[str, f
         inflow mass [kg/m] at which it first passes 1, None for never. Empty for a case without limits or result.
     """
     found: dict[str, dict[str, float | None]] = {}
-    for name in UTILISATIONS if model is not None else ():
+    answered = model is not None and "model" in case.dims and model in case["model"].values
+    for name in UTILISATIONS if answered else ():
         if f"{name}_largest" in case:
             largest, passing = (float(case[f"{name}_{end}"].sel(model=model)) for end in ("largest", "passing_mass"))
             if not np.isnan(largest):
