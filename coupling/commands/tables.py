@@ -2,7 +2,6 @@
 
 from rich.table import Table
 
-from coupling.postprocess.limits import HEADS, limit_rows
 from structure.response import FORCES, SHOWN
 
 
@@ -27,6 +26,8 @@ def response_table(data, tunnel=None):
 
 def limits_table(found, tunnel=None):
     """Utilisations of limits with where they pass 1; `found` as of :func:`structure.utilisations`."""
+    from coupling.postprocess.limits import HEADS, limit_rows
+
     table = Table(*HEADS, title=None if tunnel is None else f"limits of the ring of tunnel {tunnel}")
     for row in limit_rows(found):
         table.add_row(*row)

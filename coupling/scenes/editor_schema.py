@@ -44,9 +44,9 @@ def scene_schema() -> dict[str, Any]:
     schema = file_schema(Scene)
     tables = schema["$defs"]
     for name, unit in UNITS.items():
-        table, _, key = name.rpartition(".")
-        properties = tables["Ground" if table else "Ring"]["properties"]
-        properties[key] = with_unit(properties[key], unit)
+        *path, key = name.split(".")
+        properties = _properties(schema, path)
+        properties[key] = with_unit(properties.get(key, {"type": "number"}), unit)
     properties = schema["properties"]
     for table in (schema, *tables.values()):
         for key in OPTIONAL:
@@ -67,6 +67,16 @@ def scene_schema() -> dict[str, Any]:
     about = "Built-in scene, or file, from which everything comes that this file does not say."
     properties["base"] = {"anyOf": [{"enum": scene_names()}, {"type": "string"}], "description": about}
     return schema
+
+
+def _properties(schema: dict[str, Any], path: list[str]) -> dict[str, Any]:
+    """Properties of a table within tables; an open one, of names to numbers, gets them."""
+    table = schema
+    for name in path:
+        table = table["properties"][name]
+        named = [entry["$ref"] for entry in (table, *table.get("anyOf", ())) if "$ref" in entry]
+        table = schema["$defs"][named[0].rpartition("/")[2]] if named else table
+    return table.setdefault("properties", {})
 
 
 def file_schema(model: type[BaseModel]) -> dict[str, Any]:

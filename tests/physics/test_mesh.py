@@ -23,7 +23,7 @@ ROUND_OFF = 1e-12
 
 def changed(scene, **changes) -> Scene:
     """The scene with other tables."""
-    data = scene.model_dump(exclude={"ring"})
+    data = scene.model_dump(exclude={"ring", "limits"})
     for key, value in changes.items():
         data[key] = {**data[key], **value} if isinstance(value, dict) and isinstance(data[key], dict) else value
     return Scene(**data)
