@@ -71,7 +71,7 @@ def parse(words, place):
     group = typer.main.get_command(app)
     name, *rest = words[1:]
     command = group.get_command(None, name)
-    assert command or name in ("--version", "--help"), f"{place}: gush {name}: no such command"
+    assert command or name in ("--version", "--help", "--install-completion"), f"{place}: gush {name}: no such command"
     try:
         if command:
             command.make_context(name, rest)
