@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-#: How much coarser than that of case 3 meshes are: its second one, that of the unknowns, the coarsest of a look.
+#: How much coarser than that of case 3 meshes are: its second one, the others', that of the unknowns and of a look.
 MIDDLE, COARSE, COARSEST = 1.4, 2.0, 3.0
-#: Where most cases end, and where case 3 and the twin tunnels do: inflow masses that the source looks at [kg/m].
+#: Where most cases end, and where case 3 does: inflow masses that the source looks at [kg/m].
 COMPARED, LAST = 1000.0, 2000.0
 OUTPUT = {"output.interval": 0.02, "output.snapshot_interval": 0.1}
 SELDOM = {"output.interval": 0.05, "output.snapshot_interval": 0.25}
@@ -35,7 +35,7 @@ def plans(quick: bool = False) -> list[dict]:
     """Definitions of the studies, in the order in which they run; see :class:`coupling.studies.design.Study`.
 
     All cases are on the meshes of their scenes, case 3 also on two others, case 5 and the twin tunnels on one; unknowns
-    are varied on a mesh :data:`COARSE` times as coarse.
+    are varied on a mesh :data:`COARSEST` times as coarse.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def plans(quick: bool = False) -> list[dict]:
     """
     whole, part = {"inflow_mass": LAST, "time": 20.0}, {"inflow_mass": COMPARED, "time": 10.0}
     scenes = ["case-3", "twin-tunnels", *(f"case-{k}" for k in (1, 2, 4, 5, 6, 7, 8, 9, 10))]
-    own, other, varied = (COARSE, COARSEST, COARSEST) if quick else (1.0, 1.0, COARSE)
+    own, other, varied = (COARSE, COARSEST, COARSEST) if quick else (1.0, 1.0, COARSEST)
     again = [("case-3", COARSEST)] if quick else [
         ("case-3", MIDDLE), ("case-3", COARSE), ("twin-tunnels", COARSE), ("case-5", COARSE)
     ]  # fmt: skip
@@ -54,7 +54,7 @@ def plans(quick: bool = False) -> list[dict]:
     return [
         {"name": "cases", "design": "list", "fixed": SELDOM if quick else OUTPUT,
          "backends": ["beam-spring"] if quick else ["beam-spring", "continuum"],
-         "parameters": {"scene": scenes, "stop": [whole, part if quick else whole, *[part] * (len(scenes) - 2)],
+         "parameters": {"scene": scenes, "stop": [whole, *[part] * (len(scenes) - 1)],
                         "discretisation": [sizes(own), *[sizes(other)] * (len(scenes) - 1)]}},
         {"name": "meshes", "design": "list", "fixed": SELDOM,
          "parameters": {"scene": [name for name, _ in again], "stop": [part] * len(again),
