@@ -59,7 +59,7 @@ def sum_kernel(needs):
                     plx += row.momentum_liquid_x
                     ply += row.momentum_liquid_y
             r = net.next_row[r]
-        if two_phase:
+        if two_phase and walls.fixed[i] & (OPEN_X | OPEN_Y):
             flx += walls.sides[i].push_x
             fly += walls.sides[i].push_y
         if walls.fixed[i] & MIRROR_X:  # the mirror image's momentum is the opposite

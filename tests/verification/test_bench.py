@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import mpm
+from mpm.machine.team import stage_at_hand
 from verification.small_event import small_scene
 from verification.speed.command import bench, bytes_per_point_step
 from verification.speed.passes import kernel_times, stages
@@ -34,10 +35,11 @@ def test_stages_of_long_steps_are_those_that_the_kernel_goes_through(solver):
     counted, together = [], solver.workers.together
 
     def counting(kernel, *arguments):
-        before, others = int(solver.workers._meeting[-16]), together(kernel, *arguments)
+        before = stage_at_hand(solver.workers._meeting)
+        others = together(kernel, *arguments)
         if kernel is solver._long_step:
             named = sum(parts for _, parts in stages(arguments[3].substeps, solver.parts))
-            counted.append((int(solver.workers._meeting[-16]) - before, named))
+            counted.append((stage_at_hand(solver.workers._meeting) - before, named))
         return others
 
     solver.workers.together = counting
