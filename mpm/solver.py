@@ -48,7 +48,7 @@ from mpm.step.system import Cuts, Ground, Layout, Medium, Needs, Net, System, Ta
 from mpm.tables import element_geometry, element_neighbours, outflow_nodes
 from mpm.walls.contact import FIXED_X, FIXED_Y
 from mpm.walls.moving import MovingLinings
-from mpm.walls.nodes import contact_nodes
+from mpm.walls.nodes import contact_nodes, nodes_of_moving_linings
 from mpm.walls.sides import sides_of
 
 PARTS = 4  # parts of the mesh that sum at the nodes on their own: fixed, so the bits do not depend on threads
@@ -155,11 +155,11 @@ class Solver(Measures):
         """Sort the elements by level, finest first, and tie the levels; one level without local time stepping."""
         altitude = element_geometry(mesh)["altitude"]
         level = np.zeros(len(altitude), np.int8)
-        # a lining that moves is solved together with all nodes on it, which then step together
-        held = all(self.scene.lining_of(tunnel) == "fixed" for tunnel in self.scene.tunnels)
-        if self.scene.numerics.local_time_stepping and held:
+        if self.scene.numerics.local_time_stepping:
             weight = np.full(len(altitude), float(self.scene.discretisation.points_per_element))
-            level = element_levels(mesh.elements, len(mesh.nodes), altitude, weight)
+            level = element_levels(
+                mesh.elements, len(mesh.nodes), altitude, weight, nodes_of_moving_linings(self.scene, mesh)
+            )
         mesh, level = sorted_by_level(mesh, level)
         self.levels = tie(mesh.elements, len(mesh.nodes), level)
         self.geometry = element_geometry(mesh)
@@ -421,8 +421,10 @@ class Solver(Measures):
             self._run(PLAN, UPDATE, batch)
             return
         self._run(PLAN, PLAN, batch)
-        self.moving.advance(self.system(), float(self.clock.dt_of_level[0]))  # all levels are one
-        self._run(SOLVE, UPDATE)
+        substeps = batch.substeps[0]
+        for k in range(substeps):
+            self.moving.advance(self.system(), float(self.clock.dt_of_level[0]))  # that of all nodes on moving linings
+            self._run(SOLVE, UPDATE, Batch.one_substep(k, substeps))
 
     def _run(self, first_pass, last_pass, batch=None, advance=True):
         """Some passes (`mpm.step.substep.PASSES`) of all substeps, by all threads; None: of a long step planned."""

@@ -84,7 +84,7 @@ class Levels:
         return 0.5 * (1.0 - periods[self.finest_around] / periods[self.of_element])
 
 
-def element_levels(elements, n_nodes, altitude, weight):
+def element_levels(elements, n_nodes, altitude, weight, finest):
     """Level of every element, such that its altitude is at least 2^level times that of level 0.
 
     The altitude where level 0 begins lies between half and all of the shortest one: where the work is least. The four
@@ -98,17 +98,20 @@ def element_levels(elements, n_nodes, altitude, weight):
         Smallest altitude [m]; the time step is proportional to it.
     weight : (n_elements,) float64
         Work of an element in a step, in any unit.
+    finest : (n_nodes,) bool
+        Nodes that are of level 0 with all their elements.
 
     Returns
     -------
     (n_elements,) int8
     """
     cells = elements.reshape(-1, 12)
+    first = finest[cells].any(axis=1)
     altitude, weight = altitude.reshape(-1, 4).min(axis=1), weight.reshape(-1, 4).sum(axis=1)
     best, least = np.zeros(len(cells), np.int8), float(weight.sum())
     for offset in OFFSETS[::-1]:
         own = np.floor(np.log2(altitude / (offset * altitude.min())) + 1e-9).astype(np.int8)
-        level = _widened(np.minimum(own, MOST_LEVELS - 1), cells, n_nodes)
+        level = _widened(np.where(first, 0, np.minimum(own, MOST_LEVELS - 1)), cells, n_nodes)
         work = float((weight / 2.0**level).sum()) / offset
         if work < 0.999 * least:
             best, least = level, work

@@ -37,6 +37,12 @@ class Batch(NamedTuple):
     limits: np.ndarray  # (most,) int64, places in `mpm.pace.clock.LIMITS`
     most_substeps: int  # no further long step begins after so many of the finest level
     most_point_steps: int
+    first_substep: int = 0  # of the first long step
+
+    @classmethod
+    def one_substep(cls, k, of):
+        """Substep `k` of a long step that is planned and has so many, with what ends the step after the last one."""
+        return cls(np.array([k + 1, 0] if k + 1 == of else [k + 1]), np.zeros(0, np.int64), 0, 0, k)
 
 
 @kernel_part
@@ -179,7 +185,7 @@ def long_step_kernel(needs):
                         plan(number, batch, system)
             if last_pass == PLAN:
                 return
-            for k in range(batch.substeps[number]):
+            for k in range(batch.first_substep if number == 0 else 0, batch.substeps[number]):
                 if not substep(team, k, first_pass, last_pass, advance, system):
                     return
             if batch.substeps[number] == 0 or last_pass < UPDATE:

@@ -83,6 +83,17 @@ def contact_nodes(scene, mesh):
     )
 
 
+def nodes_of_moving_linings(scene, mesh):
+    """Nodes that a lining touches which is not held: (n_nodes,) bool."""
+    touched = np.zeros(len(mesh.nodes), bool)
+    for t, tunnel in enumerate(scene.tunnels):
+        if scene.lining_of(tunnel) != "fixed":
+            touched[mesh.outer_nodes[t]] = True
+            if scene.gate is not None and scene.gate.tunnel == t:
+                touched[mesh.wall_nodes] = touched[mesh.inner_nodes] = True
+    return touched
+
+
 def ring_positions(scene, mesh, outer):
     """Positions of all nodes of a ring, clockwise: those of a half model and their mirror images [m]."""
     position = mesh.nodes[outer]

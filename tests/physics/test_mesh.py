@@ -219,7 +219,8 @@ def test_estimated_elements_are_those_of_the_mesh_within_a_fifth(name):
 def test_elements_of_a_cell_are_of_one_level(quick_mesh):
     mesh = quick_mesh
     altitude = altitudes(mesh.nodes, mesh.elements)
-    level = element_levels(mesh.elements, len(mesh.nodes), altitude, np.ones(len(altitude))).reshape(-1, 4)
+    nowhere = np.zeros(len(mesh.nodes), bool)
+    level = element_levels(mesh.elements, len(mesh.nodes), altitude, np.ones(len(altitude)), nowhere).reshape(-1, 4)
     assert np.array_equal(level, np.repeat(level[:, :1], 4, axis=1)) and level.max() > 3
     assert (altitude >= 0.5 * altitude.min() * 2.0 ** level.ravel()).all()
 

@@ -299,8 +299,8 @@ def test_light_and_heavy_linings_are_stable(kind, density):
     solver.relax()
     solver.open_gate()
     settled = solver.lining_displacement.copy()
-    for _ in range(400):
-        solver.step()
+    while solver.time < 0.06:
+        solver.advance(0.06)
     # free fall of the heaviest and free rise of the lightest would bring far more; the ground lets them creep
     assert np.abs(solver.lining_displacement - settled).max() < 0.02
     assert np.abs(solver.lining_velocity).max() < 0.3
@@ -324,6 +324,21 @@ def test_mirrored_gate_moves_an_elastic_lining_as_its_mirror_image():
     series = np.r_[1.0, np.tile([1.0, -1.0], 6)]  # cos stays, sin turns; v turns as a whole
     mirror = np.r_[series, -series]
     assert moved[1] == pytest.approx(mirror * moved[0], abs=1e-6 * np.abs(moved[0]).max())
+
+
+@pytest.mark.parametrize("kind", ["floating", "elastic"])
+def test_levels_beside_a_moving_lining_change_its_motion_little(kind):
+    rises = []
+    for local in (True, False):
+        solver = solver_of(kind, numerics={"local_time_stepping": local})
+        assert (solver.levels.count > 1) == local
+        solver.relax()
+        solver.open_gate()
+        settled = solver.lining_displacement.copy()
+        while solver.time < 0.05:
+            solver.advance(0.05)
+        rises.append(solver.lining_displacement - settled)
+    assert rises[0] == pytest.approx(rises[1], abs=0.01 * np.abs(rises[1]).max())
 
 
 def test_ground_that_gushes_carries_the_velocity_of_the_wall():
