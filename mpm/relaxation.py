@@ -191,4 +191,5 @@ def relax(solver, friction, tolerance, max_steps, progress=None):
         last_energy = energy
     if s.moving is not None:
         s.moving.halt()
+        s.moving.remember()
     return step, residual, reaction

@@ -10,7 +10,7 @@ import math
 import os
 from functools import cached_property
 from itertools import pairwise
-from typing import Annotated, Literal, Union
+from typing import Annotated, Any, Literal, Union
 
 from pydantic import Field, SerializeAsAny, WrapValidator, model_validator
 
@@ -62,8 +62,8 @@ class Water(Part):
 
 #: A soil, of the class that its `model` names: one of these, or of a third party.
 SoilOfItsLaw = Annotated[SerializeAsAny[Union[built_in_laws()]], WrapValidator(soil_of_its_law)]  # noqa: UP007
-#: How a lining stands in the ground: held, rigid and free to move, or a homogeneous elastic ring.
-Lining = Literal["fixed", "floating", "elastic"]
+#: How a lining stands in the ground: held, rigid and free to move, a homogeneous elastic ring, or the segmental one.
+Lining = Literal["fixed", "floating", "elastic", "jointed"]
 
 
 class Tunnel(Part):
@@ -72,14 +72,15 @@ class Tunnel(Part):
     Parameters
     ----------
     lining : str or None
-        "fixed", "floating" (rigid, moves under its weight, soil and water) or "elastic" (homogeneous ring in plane
-        strain); None: what the scene says for all tunnels.
+        "fixed", "floating" (rigid, moves under its weight, soil and water), "elastic" (homogeneous ring in plane
+        strain) or "jointed" (segments and joints of the scene's ring); None: what the scene says for all tunnels.
     lining_density : float or None
         [kg/m3], needed where the lining moves.
     lining_modulus, lining_poissons_ratio : float or None
         Young's modulus [Pa] and Poisson's ratio, needed where it is elastic.
     lining_harmonics : int
-        Fourier harmonics of the displacement of an elastic lining; 2 ovalises it.
+        Fourier harmonics of the displacement of an elastic lining, 2 ovalises it; of a jointed one those of pressure
+        and shear that its coordinates are exact for.
     """
 
     x: Length
@@ -483,10 +484,21 @@ class Scene(Part):
         ]
         return max(abs(1 - k0) / (2 * math.sqrt(k0)) if k0 > 0 else math.inf for k0 in beside)
 
+    def jointed_ring(self, tunnel: Tunnel) -> Any:
+        """The ring that moves as a jointed lining, as of :class:`mpm.walls.rings.LiningRing`; scenes with a ring know.
+
+        Raises
+        ------
+        ValueError
+        """
+        raise ValueError(
+            f"lining: 'jointed' of {tunnel!r} needs a ring, which mpm.Scene has not; give a coupling.Scene"
+        )
+
     def _check_lining(self, k, tunnel):
         kind = self.lining_of(tunnel)
-        needed = {"fixed": (), "floating": ("lining_density",)}.get(
-            kind, ("lining_density", "lining_modulus", "lining_poissons_ratio")
+        needed = {"fixed": (), "elastic": ("lining_density", "lining_modulus", "lining_poissons_ratio")}.get(
+            kind, ("lining_density",)
         )
         for name in needed:
             if getattr(tunnel, name) is None:
@@ -495,7 +507,7 @@ class Scene(Part):
                     "lining_density = 2500 kg/m3, lining_modulus = 34.5e9 Pa, lining_poissons_ratio = 0.2"
                 )
         most = math.floor(math.pi * tunnel.outer_radius / self.discretisation.element_size_lining)
-        if kind == "elastic" and tunnel.lining_harmonics > most:
+        if kind in ("elastic", "jointed") and tunnel.lining_harmonics > most:
             raise ValueError(
                 f"tunnel {k}: lining_harmonics must not exceed {most}, two elements of the lining a wave, got "
                 f"{tunnel.lining_harmonics}; lower it, or discretisation.element_size_lining"

@@ -196,12 +196,12 @@ class Solver(Measures):
             records["normal_x"][on_mirror_line] = 0.0
         self.impulse = np.zeros(self.n_contact, REACTION_RECORD)
         self.moving, self.wall = None, np.zeros((self.n_contact, 2))
-        self.lining_displacement = self.lining_velocity = self.lining_impulse = np.zeros(0)
+        self.lining_displacement = self.lining_velocity = self.lining_impulse = self.joint_memory = np.zeros(0)
         if self.needs.moving:
             self.moving = moving = MovingLinings(scene, self.needs, mesh, self.contact_of_node, contact.moved_by)
             self.wall = moving.wall
             self.lining_displacement, self.lining_velocity = moving.displacement, moving.velocity
-            self.lining_impulse = moving.left
+            self.lining_impulse, self.joint_memory = moving.left, moving.memory
 
     def _sort(self):
         self.n_occupied, self.n_active = sort_by_element(

@@ -9,7 +9,7 @@ import numpy as np
 #: Arrays, copied in place. `sums` holds the points as mapped at the end of the last step, in its order of summation.
 ARRAYS = (
     "points", "element_of_point", "soil_of_point", "initial_volume", "nodes", "sums", "contents", "impulse",
-    "clamps", "ledger", "lining_displacement", "lining_velocity", "lining_impulse",
+    "clamps", "ledger", "lining_displacement", "lining_velocity", "lining_impulse", "joint_memory",
 )  # fmt: skip
 #: Numbers: simulated time [s], counters, grains taken out [kg/m], speed of the fast wave and that which gives
 #: the step [m/s], spectral step [s].

@@ -32,6 +32,8 @@ class RingParts(NamedTuple):
         the area that each reaction [Pa] acts on [m2/m].
     weight : (n,) float64
         Forces of the concrete's weight.
+    mass : (n, n) sparse
+        Of concrete with a density of one, lumped at the nodes [m2].
     place : (n,) int
         Place of each unknown in a narrow band.
     held : (n_held,) int
@@ -55,6 +57,7 @@ class RingParts(NamedTuple):
     feel: sparse.csr_array
     area: np.ndarray
     weight: np.ndarray
+    mass: sparse.csr_array
     place: np.ndarray
     held: np.ndarray
     nodes: np.ndarray

@@ -3,6 +3,7 @@
 import re
 
 from mpm.fields import CLAMPS, POINT
+from structure.response import COORDINATES, RESPONSE
 
 AXES = {"time": "T", "x": "X", "y": "Y"}
 INFLOW = "inflow_mass"  # a coordinate along time, beside the time itself
@@ -20,12 +21,15 @@ MOTION = {
     "displacement_radial": ("m", "displacement of the lining's outer face, outward positive"),
     "displacement_tangential": ("m", "displacement of the lining's outer face, clockwise positive"),
 }
-#: And for elastic ones: the ring's own forces, per metre of tunnel.
+#: And for those that deform: the ring's own forces, per metre of tunnel.
 RING_FORCES = {
-    "axial_force": ("N/m", "axial force of the elastic lining, compression positive"),
-    "shear_force": ("N/m", "shear force of the elastic lining, -dM/ds"),
-    "bending_moment": ("N m/m", "bending moment of the elastic lining, tension on the outer face positive"),
+    "axial_force": ("N/m", "axial force of the lining that deforms, compression positive"),
+    "shear_force": ("N/m", "shear force of the lining that deforms, -dM/ds"),
+    "bending_moment": ("N m/m", "bending moment of the lining that deforms, tension on the outer face positive"),
 }
+#: Of jointed ones, on (time, [tunnel,] joint).
+JOINT_MOVEMENTS = {name: RESPONSE[name][1:] for name in ("joint_opening", "joint_dislocation", "joint_rotation")}
+JOINTS = {name: COORDINATES[name] for name in ("joint", "joint_angle")}
 #: Variables on (time,) that `/lining` repeats from `/history`, so that pressures can be compared at equal inflow.
 PROGRESS = {
     "inflow_mass": ("kg/m", "grains inside the tunnel, per metre of tunnel"),

@@ -19,6 +19,8 @@ from coupling.datasets.schema import (
     HISTORY,
     INFLOW,
     INTEGERS,
+    JOINT_MOVEMENTS,
+    JOINTS,
     MOTION,
     POINTS,
     PRESSURES,
@@ -74,7 +76,9 @@ class RunWriter:
         self._n_tunnels = len(scene.tunnels)
         self._points = POINTS | {name: (unit, meaning) for name, unit, meaning in history_of(scene)}
         kinds = {scene.lining_of(tunnel) for tunnel in scene.tunnels}
-        self._on_theta = PRESSURES | (MOTION if kinds - {"fixed"} else {}) | (RING_FORCES if "elastic" in kinds else {})
+        deforms = kinds & {"elastic", "jointed"}
+        self._on_theta = PRESSURES | (MOTION if kinds - {"fixed"} else {}) | (RING_FORCES if deforms else {})
+        self._joints = scene.ring.joint_angles if "jointed" in kinds else ()
 
     @property
     def written(self):
@@ -166,6 +170,15 @@ class RunWriter:
             chunk = (16, *tunnels.values(), 360)
             variable = _variable(lining, name, ("time", *tunnels, "theta"), "f8", meaning, chunk)
             variable.attrs["cell_methods"] = f"time: {'mean' if name in PRESSURES else 'point'} theta: mean"
+        if self._joints:
+            lining.dimensions["joint"] = len(self._joints)
+            _variable(lining, "joint", ("joint",), "i4", JOINTS["joint"])[:] = 1 + np.arange(len(self._joints))
+            _variable(lining, "joint_angle", ("joint",), "f8", JOINTS["joint_angle"])[:] = self._joints
+            lining.attrs["coordinates"] += " joint_angle"
+        for name, meaning in JOINT_MOVEMENTS.items() if self._joints else ():
+            chunk = (64, *tunnels.values(), len(self._joints))
+            variable = _variable(lining, name, ("time", *tunnels, "joint"), "f8", meaning, chunk)
+            variable.attrs["cell_methods"] = "time: point"
 
     @staticmethod
     def _create_group(file, name, attributes):
@@ -182,6 +195,10 @@ class RunWriter:
         for name in self._on_theta if self._n_tunnels else ():
             values = np.array([[self._resample(t, part, name) for t, part in enumerate(r.lining)] for r in batch])
             group[name][rows] = values if self._n_tunnels > 1 else values[:, 0]
+        for name in JOINT_MOVEMENTS if self._joints else ():
+            none = np.full(len(self._joints), np.nan)  # of a lining that is not jointed, beside one that is
+            values = np.array([[part.get(name, none) for part in record.lining] for record in batch])
+            group[name][rows] = values if self._n_tunnels > 1 else values[:, 0]
         for name in PROGRESS:
             group[name][rows] = [getattr(record, name) for record in batch]
         group["time"][rows] = [record.time for record in batch]
@@ -189,7 +206,7 @@ class RunWriter:
     def _resample(self, tunnel, part, name):
         if tunnel not in self._weights:
             self._weights[tunnel] = cell_mean_weights(part["theta"])
-        if name not in part:  # of a lining that is not elastic, beside one that is
+        if name not in part:  # of a lining that does not deform, beside one that does
             return np.full(360, np.nan)
         return self._weights[tunnel] @ part[name]
 

@@ -33,6 +33,7 @@ from coupling.scenes.plausibility import hints
 from coupling.scenes.rings import UNITS, derived_ring, in_si, number_of, ring_of
 from mpm.quantities import quantity_in
 from mpm.scene import Scene as MpmScene
+from mpm.scene import Tunnel
 from structure.inputs import Input, mistakes, models_in, shortened, table_html
 from structure.limits import Limits
 from structure.ring import Ring
@@ -127,6 +128,20 @@ class Scene(Input, MpmScene):
                     f"got {gate.width:g} m; the gate lies in or between segments, give e.g. 0.2"
                 )
         return self
+
+    @model_validator(mode="after")
+    def _check_jointed(self) -> "Scene":
+        if self.ring is None and any(self.lining_of(tunnel) == "jointed" for tunnel in self.tunnels):
+            raise ValueError("lining: 'jointed' must come with a ring, got none; add [ring], or choose 'elastic'")
+        return self
+
+    def jointed_ring(self, tunnel: Tunnel) -> Any:
+        """The ring of a tunnel as it moves in the ground: beams and joints, reduced (:mod:`structure.reduced`)."""
+        from structure.models import lining_model
+        from structure.reduced import ReducedRing
+
+        model = lining_model("beam-spring")(ring_of(self, self.tunnels.index(tunnel)))
+        return ReducedRing(model, tunnel.lining_density, self.gravity, tunnel.lining_harmonics)
 
     @model_validator(mode="after")
     def _check_limits(self) -> "Scene":

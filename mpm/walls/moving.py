@@ -5,8 +5,9 @@ together: at every contact node the reactions of soil and water follow from the 
 equations of `mpm.walls.contact`, seen from the wall), and the ring's velocity u is the root of
     F(u) = A (u - u0) - dt (weight - K x) + sum over nodes of G^T dt R(G u),   A = M + dt^2/4 K,
 with G the velocity of a node per coordinate of the ring. The reactions are piecewise linear in u, so Newton's method
-ends after as many iterations as contacts change their state in a step, mostly one. What it leaves is taken into the
-next step: momentum is conserved whatever happens.
+ends after as many iterations as contacts change their state in a step, mostly one. Joints that open, gape or slide add
+s(x + dt/4 (u - u0)) dt, which is linearised around the last solution until that is exact. What is left is taken into
+the next step: momentum is conserved whatever happens.
 """
 
 from functools import cache
@@ -18,9 +19,11 @@ from mpm.fields import record, values
 from mpm.machine.compile import kernel, kernel_part
 from mpm.step.nodes import free_kernel, moved, sum_kernel, velocities_of
 from mpm.walls.contact import Masses, Pair, response_kernel
-from mpm.walls.rings import ElasticRing, RigidRing
+from mpm.walls.rings import BETA, ElasticRing, RigidRing, effective_mass
 
 MAX_ITERATIONS = 100
+MAX_JOINT_ITERATIONS = 50
+ROUNDINGS = 16  # of the largest term of a joint's force, that no residual gets below
 SMALLEST_SHARE = 1e-3  # of Newton's step
 TOLERANCE = 1e-11  # of the largest term of an equation: round-off of its sum
 
@@ -236,6 +239,8 @@ class MovingLinings:
     ----------
     displacement, velocity, left : (m,) float64
         Coordinates of all rings [m], their rates [m/s], and impulses taken into the next step [N s/m].
+    memory : (n,) float64
+        What joints that are not linear remember.
     wall : (n_contact, 2) float64
         Velocity of the lining at its contact nodes [m/s], of the step at hand.
     """
@@ -251,7 +256,9 @@ class MovingLinings:
         rings = [(t, ring) for t, ring in enumerate(lining_ring(scene, tunnel) for tunnel in scene.tunnels) if ring]
         ends = np.cumsum([0, *(len(ring.weight) for _, ring in rings)])
         self.displacement, self.velocity, self.left = (np.zeros(ends[-1]) for _ in range(3))
-        for (t, ring), first, last in zip(rings, ends, ends[1:], strict=False):
+        joints = np.cumsum([0, *(0 if ring.joints_linear else len(ring.jumps) for _, ring in rings)])
+        self.memory = np.zeros(joints[-1])
+        for (t, ring), first, last, *joint in zip(rings, ends, ends[1:], joints, joints[1:], strict=False):
             rows, tunnel = np.asarray(rows_of_tunnel[t]), scene.tunnels[t]
             x, y = (mesh.nodes[self.node_of_contact[rows]] - [tunnel.x, -tunnel.axis_depth]).T
             theta, radius = np.arctan2(x, y), np.hypot(x, y)
@@ -263,6 +270,7 @@ class MovingLinings:
                     motion=ring.motion(theta, radius),
                     state=np.zeros(len(rows), STATE_RECORD),
                     due=np.zeros(last - first),
+                    memory=self.memory[slice(*joint)],
                     **{name: getattr(self, name)[first:last] for name in ("displacement", "velocity", "left")},
                 )
             )
@@ -276,11 +284,35 @@ class MovingLinings:
             ring = part.ring
             self._gather(system, dt, part.rows, self.node_of_contact, part.state)
             ring_impulse(ring.stiffness, ring.weight, part.displacement, dt, part.due)
-            self._find(
-                part.state, part.rows, part.motion, system.walls.contact, ring.effective_mass(dt), part.due,
-                part.velocity, part.left, self.wall,
-            )  # fmt: skip
+            if ring.joints_linear:
+                self._solve(part, system.walls.contact, effective_mass(ring, dt), part.due)
+            else:
+                self._solve_with_joints(part, system.walls.contact, dt)
             part.displacement += dt * part.velocity
+
+    def _solve(self, part, contact, mass, due):
+        self._find(
+            part.state, part.rows, part.motion, contact, mass, due, part.velocity, part.left, self.wall
+        )  # fmt: skip
+
+    def _solve_with_joints(self, part, contact, dt):
+        """The ring's velocity where its joints are not linear: their forces linearised where they were found last."""
+        ring, before, owed = part.ring, part.velocity.copy(), part.left.copy()
+        place = part.displacement
+        force, tangent, remembered = ring.joint_forces(place, part.memory)
+        for _ in range(MAX_JOINT_ITERATIONS):
+            due = part.due - dt * (force - tangent @ (place - part.displacement))
+            part.velocity[:], part.left[:] = before, owed
+            self._solve(part, contact, effective_mass(ring, dt, tangent), due)
+            last, size = place, np.abs(force) + np.abs(tangent) @ np.abs(place)
+            place = part.displacement + BETA * dt * (part.velocity - before)
+            expected = force + tangent @ (place - last)
+            force, tangent, remembered = ring.joint_forces(place, part.memory)
+            missed = force - expected
+            if np.all(np.abs(missed) <= ROUNDINGS * np.finfo(float).eps * size):
+                break
+        part.left += dt * missed
+        part.memory[:] = remembered
 
     def settle(self, force, held_liquid, mass, velocity, contact):
         """One pseudo time step of 1 s of the drained relaxation (`mpm.relaxation`): moves the rings, sets `wall`.
@@ -312,10 +344,14 @@ class MovingLinings:
             ring_mass = ring.mass * (mass[nodes].sum() / ring.mass.diagonal().max())
             before = part.velocity.copy()
             ring_impulse(ring.stiffness, ring.weight, part.displacement + before, 1.0, part.due)
+            held = ring.stiffness
+            if not ring.joints_linear:
+                force, tangent, _ = ring.joint_forces(part.displacement + before, part.memory)
+                part.due -= force
+                held = held + tangent
             part.due -= np.einsum("kdm,kd,k->m", part.motion, n, water)
             self._find_dry(
-                part.state, rows, part.motion, contact, ring_mass + ring.stiffness, part.due, part.velocity, part.left,
-                self.wall,
+                part.state, rows, part.motion, contact, ring_mass + held, part.due, part.velocity, part.left, self.wall
             )  # fmt: skip
             part.displacement += part.velocity
             momentum = np.einsum("ij,j->i", ring_mass, part.velocity)
@@ -328,15 +364,21 @@ class MovingLinings:
         self.velocity[:] = 0.0
         self.left[:] = 0.0
 
+    def remember(self):
+        """Let the joints remember where they are: in the initial state as if they had gone there straight."""
+        for part in self.parts:
+            if not part.ring.joints_linear:
+                part.memory[:] = part.ring.joint_forces(part.displacement, part.memory)[2]
+
     def motion_at(self, tunnel, theta):
         """Displacement of the outer face, and the forces of an elastic ring, at theta [degrees].
 
         Returns
         -------
         dict of str to (n,) float64
-            displacement_radial, displacement_tangential [m], outward and clockwise; for an elastic ring axial_force,
-            shear_force [N/m], bending_moment [N m/m] of :meth:`mpm.walls.rings.ElasticRing.internal_forces`. Zero and
-            empty for a fixed lining.
+            displacement_radial, displacement_tangential [m], outward and clockwise; of a ring that deforms axial_force,
+            shear_force [N/m], bending_moment [N m/m]; (n_joints,) of a jointed one joint_opening, joint_dislocation
+            [m], joint_rotation [rad]. Zero and empty for a fixed lining.
         """
         part = next((part for part in self.parts if part.tunnel == tunnel), None)
         a = np.radians(theta)
@@ -348,9 +390,12 @@ class MovingLinings:
             "displacement_radial": x * np.sin(a) + y * np.cos(a),
             "displacement_tangential": x * np.cos(a) - y * np.sin(a),
         }
-        if isinstance(part.ring, ElasticRing):
+        if hasattr(part.ring, "internal_forces"):
             forces = part.ring.internal_forces(part.displacement, a)
             result |= dict(zip(("axial_force", "shear_force", "bending_moment"), forces, strict=True))
+        if hasattr(part.ring, "jumps"):
+            moved = part.ring.jumps @ part.displacement
+            result |= dict(zip(("joint_opening", "joint_dislocation", "joint_rotation"), moved.T, strict=True))
         return result
 
 
@@ -358,6 +403,8 @@ def lining_ring(scene, tunnel):
     """The ring that moves as a tunnel's lining, or None where it is fixed."""
     geometry = tunnel.outer_radius, tunnel.inner_radius, tunnel.lining_density, scene.gravity
     kind = scene.lining_of(tunnel)
+    if kind == "jointed":
+        return scene.jointed_ring(tunnel)
     if kind == "elastic":
         return ElasticRing.build(
             *geometry, tunnel.lining_modulus, tunnel.lining_poissons_ratio, tunnel.lining_harmonics

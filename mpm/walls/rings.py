@@ -13,6 +13,18 @@ import numpy as np
 BETA = 0.25
 
 
+def effective_mass(ring, dt, joints=0.0):
+    """M + beta dt^2 (K + joints) [kg/m], (m, m), of a ring and the stiffness of joints that are not linear [N/m2].
+
+    With velocities half a step before the displacements, u1 = u0 + dt a and x1 = x0 + dt u1, an acceleration
+    (M + dt^2/4 K) a = weight - K x0 - reactions is the trapezoidal rule: every frequency of the ring is stable at any
+    dt and none is damped. The rest of a coupled system, advanced by the same leapfrog without the extra mass, keeps the
+    critical step that it has beside a ring without stiffness (Belytschko & Mullen 1978). In the means of the
+    displacements before and after it is the implicit midpoint rule, which takes forces at x0 + beta dt (u1 - u0).
+    """
+    return ring.mass + BETA * dt**2 * (ring.stiffness + joints)
+
+
 @dataclass(frozen=True, eq=False)
 class LiningRing:
     """Equation of motion M du/dt = weight - K x - reactions, per metre of tunnel, in m coordinates.
@@ -23,25 +35,28 @@ class LiningRing:
         [kg/m], [N/m2]
     weight : (m,) float64
         Generalised force of gravity [N/m].
+
+    Notes
+    -----
+    Any object may stand for a lining that has these, `outer_radius` [m] and `motion`; `internal_forces` where it knows
+    them; and where its joints are not linear, `joints_linear` False with
+
+    joint_forces(displacement, memory) : force [N/m], its derivative [N/m2], and what the joints remember then:
+        (m,), (m, m), (n,) float64;  `jumps` : (n, 3, m) float64, what the joints feel.
     """
 
     mass: np.ndarray
     stiffness: np.ndarray
     weight: np.ndarray
+    joints_linear = True
 
     def force(self, displacement):
         """Weight and elastic force at a displacement [N/m], (m,)."""
         return self.weight - self.stiffness @ displacement
 
     def effective_mass(self, dt):
-        """M + beta dt^2 K [kg/m], (m, m).
-
-        With velocities half a step before the displacements, u1 = u0 + dt a and x1 = x0 + dt u1, an acceleration
-        (M + dt^2/4 K) a = weight - K x0 - reactions is the trapezoidal rule: every frequency of the ring is stable at
-        any dt and none is damped. The rest of a coupled system, advanced by the same leapfrog without the extra mass,
-        keeps the critical step that it has beside a ring without stiffness (Belytschko & Mullen 1978).
-        """
-        return self.mass + BETA * dt**2 * self.stiffness
+        """Of :func:`effective_mass`."""
+        return effective_mass(self, dt)
 
     def step(self, displacement, velocity, reactions, dt):
         """Displacement and velocity after dt [s] under the reactions [N/m] that the ring exerts, (m,) each."""

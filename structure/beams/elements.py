@@ -125,3 +125,9 @@ def self_weight(ring: Ring, mesh: RingMesh) -> np.ndarray:
     force = (ring.concrete_unit_weight * ring.thickness * ring.centre_radius * weight)[:, None, None]
     downward = np.cos(angle)[:, None, None] * inward + np.sin(angle)[:, None, None] * clockwise
     return np.bincount(unknown.ravel(), (force * downward).ravel(), 3 * mesh.n_nodes)
+
+
+def nodal_masses(ring: Ring, mesh: RingMesh) -> np.ndarray:
+    """Mass of every unknown for a density of one, (3 n_nodes,): that of its tributary arc [m2], turning [m4]."""
+    area = ring.thickness * ring.centre_radius * mesh.node_span
+    return np.column_stack([area, area, area * ring.thickness**2 / 12]).ravel()

@@ -6,7 +6,14 @@ import numpy as np
 from scipy import sparse
 
 from structure.banded import folded
-from structure.beams.elements import joint_jumps, section_operators, segment_stiffness, self_weight, traction_operator
+from structure.beams.elements import (
+    joint_jumps,
+    nodal_masses,
+    section_operators,
+    segment_stiffness,
+    self_weight,
+    traction_operator,
+)
 from structure.beams.mesh import RingMesh, displacements_at, forces_at
 from structure.discrete import SIDES, DiscreteLining, Readings
 from structure.lining import THETA
@@ -61,6 +68,7 @@ def _parts(ring: Ring, mesh: RingMesh) -> RingParts:
         feel=sparse.coo_array((values, place), shape=(2 * mesh.n_nodes, size)).tocsr(),
         area=np.tile(ring.outer_radius * mesh.node_span, 2),
         weight=self_weight(ring, mesh),
+        mass=sparse.diags_array(nodal_masses(ring, mesh)).tocsr(),
         place=mesh.unknowns(folded(mesh.n_nodes)).ravel(),
         held=np.zeros(0, dtype=int) if ring.ground is not None else mesh.unknowns(invert),
         nodes=nodes,

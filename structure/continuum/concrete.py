@@ -107,11 +107,14 @@ class Concrete:
 
     def body_force(self) -> np.ndarray:
         """Nodal forces of the concrete's weight, (n_unknowns,)."""
-        values, _, _, _, area = self._gauss()
-        heavy = -self.ring.concrete_unit_weight * (self._share[:, None] * area * values).sum(axis=2)
-        angle = self.mesh.node_angle
-        total = np.bincount(self.nodes.ravel(), heavy.ravel(), len(angle))
+        angle, total = self.mesh.node_angle, -self.ring.concrete_unit_weight * self.nodal_areas()
         return np.stack([total * np.cos(angle), -total * np.sin(angle)], axis=1).ravel()
+
+    def nodal_areas(self) -> np.ndarray:
+        """Concrete that is lumped at each node, (n_nodes,) [m2]."""
+        values, _, _, _, area = self._gauss()
+        shares = (self._share[:, None] * area * values).sum(axis=2)
+        return np.bincount(self.nodes.ravel(), shares.ravel(), len(self.mesh.node_angle))
 
     def stresses(self) -> Stresses:
         """Stresses at two by two points of every element."""

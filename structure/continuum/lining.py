@@ -170,6 +170,7 @@ class ContinuumLining(DiscreteLining):
             feel=(feel @ to_nodes).tocsr(),
             area=area,
             weight=to_nodes.T @ concrete.body_force(),
+            mass=(to_nodes.T @ sparse.diags_array(np.repeat(concrete.nodal_areas(), 2)) @ to_nodes).tocsr(),
             place=(first * folded(mesh.n_lines)[:, None] + np.arange(first)).ravel(),
             held=self._held(ring),
             nodes=nodes[own[::2]],

@@ -10,6 +10,7 @@ import coupling
 import mpm
 import mpm.scene
 from mpm.fields import CONTACT_RECORD, block, numbers, values
+from mpm.state import restore_solver, solver_state
 from mpm.walls.contact import FIXED_X, FIXED_Y
 from mpm.walls.moving import STATE_RECORD, reaction_kernel
 from mpm.walls.rings import ElasticRing, RigidRing
@@ -20,6 +21,7 @@ pytestmark = pytest.mark.slow
 
 MODULUS, NU, DENSITY = 34.5e9, 0.2, 2548.0
 THETA = np.radians(np.arange(0.0, 360.0, 3.0))
+WINKLER = 0.35**2 / (12 * 3.125)  # t^2/(12 R): moment of the axial force in a section of a curved bar [m]
 
 
 def ring_of(thickness, n_harmonics=6, radius=3.125, gravity=0.0):
@@ -228,6 +230,10 @@ def test_reactions_follow_the_wall_as_their_derivatives_say(wet):
     assert len(kinds) >= (6 if wet else 3)  # held, slipping, free; water, grains or both
 
 
+JOINT_STIFFNESSES = ("joint_normal_stiffness", "joint_shear_stiffness", "joint_rotational_stiffness")
+WEAK = {"joint_contact_only": True, "joint_contact_height": 0.3, "joint_friction_coefficient": 0.5}
+
+
 def solver_of(kind, density=DENSITY, **changes):
     scene = small_scene(lining=kind, **{"initial_contact": "bonded"} | changes)
     tunnel = scene.tunnels[0].model_copy(update={"lining_density": density, "lining_harmonics": 6})
@@ -268,14 +274,14 @@ def test_ground_carries_a_floating_lining_and_keeps_it_from_rising():
     assert 0.003 < rise < 0.03
 
 
-@pytest.mark.parametrize("kind", ["floating", "elastic"])
+@pytest.mark.parametrize("kind", ["floating", "elastic", "jointed"])
 def test_lining_gains_the_momentum_that_the_ground_loses(kind):
     solver = solver_of(kind)
     solver.relax()
     solver.open_gate()
     ring, dt_sum = solver.moving.parts[0].ring, 0.0
     rigid = np.zeros((2, len(ring.weight)))  # unit motion along x and y
-    if kind == "floating":
+    if kind != "elastic":
         rigid[0, 0] = rigid[1, 1] = 1.0
     else:
         half = 1 + 2 * ring.n_harmonics
@@ -292,10 +298,18 @@ def test_lining_gains_the_momentum_that_the_ground_loses(kind):
     assert solver.balances()["contact_error"] < 1e-13
 
 
-@pytest.mark.parametrize("kind", ["floating", "elastic"])
-@pytest.mark.parametrize("density", [1.0, 1e5])
-def test_light_and_heavy_linings_are_stable(kind, density):
-    solver = solver_of(kind, density)
+@pytest.mark.parametrize(
+    ("kind", "density", "ring"),
+    [
+        *((kind, density, {}) for kind in ("floating", "elastic") for density in (1.0, 1e5)),
+        ("jointed", 1.0, WEAK),
+        ("jointed", 1e5, WEAK),
+        ("jointed", DENSITY, WEAK | dict.fromkeys(JOINT_STIFFNESSES, 1e15)),
+        ("jointed", DENSITY, {"joint_rotational_stiffness": 0.0}),
+    ],
+)
+def test_light_heavy_hinged_and_stiff_linings_are_stable(kind, density, ring):
+    solver = solver_of(kind, density, ring=ring)
     solver.relax()
     solver.open_gate()
     settled = solver.lining_displacement.copy()
@@ -305,6 +319,40 @@ def test_light_and_heavy_linings_are_stable(kind, density):
     assert np.abs(solver.lining_displacement - settled).max() < 0.02
     assert np.abs(solver.lining_velocity).max() < 0.3
     assert np.abs(solver.lining_impulse).max() < 1e-9 * np.abs(values(solver.impulse, ("soil", "water"))).sum()
+
+
+def test_ring_with_stiff_joints_is_the_elastic_one():
+    ovalised, moments = [], []
+    stiff = {"section": "euler-bernoulli"} | dict.fromkeys(JOINT_STIFFNESSES, 1e15)
+    for kind, ring in (("elastic", {}), ("jointed", stiff)):
+        solver = solver_of(kind, ring=ring, numerics={"relaxation_tolerance": 1e-5})
+        solver.relax()
+        moved = solver.moving.motion_at(0, np.arange(360.0))
+        outward = moved["displacement_radial"]
+        ovalised.append(outward[90] + outward[270] - outward[0] - outward[180])
+        moments.append(moved["bending_moment"] - (kind == "elastic") * WINKLER * moved["axial_force"])
+    assert ovalised[1] == pytest.approx(ovalised[0], rel=0.01)
+    assert moments[1] == pytest.approx(moments[0], abs=0.01 * np.abs(moments[0]).max())
+
+
+def test_joints_that_slide_are_kept_with_the_state():
+    states, ring = [], WEAK | {"joint_friction_coefficient": 0.02}
+    for pause in (False, True):
+        solver = solver_of("jointed", ring=ring)
+        solver.relax()
+        solver.open_gate()
+        for k in range(12):
+            if pause and k == 6:
+                state = {name: np.copy(value) for name, value in solver_state(solver).items()}
+                solver = solver_of("jointed", ring=ring)
+                restore_solver(solver, state)
+            solver.step()
+        states.append(solver)
+    whole, resumed = states
+    assert np.abs(whole.joint_memory).max() > 1e-5  # they slide
+    for name in ("joint_memory", "lining_displacement", "lining_velocity"):
+        assert np.array_equal(getattr(whole, name), getattr(resumed, name))
+    assert np.array_equal(whole.points, resumed.points)
 
 
 def test_mirrored_gate_moves_an_elastic_lining_as_its_mirror_image():
@@ -326,7 +374,7 @@ def test_mirrored_gate_moves_an_elastic_lining_as_its_mirror_image():
     assert moved[1] == pytest.approx(mirror * moved[0], abs=1e-6 * np.abs(moved[0]).max())
 
 
-@pytest.mark.parametrize("kind", ["floating", "elastic"])
+@pytest.mark.parametrize("kind", ["floating", "elastic", "jointed"])
 def test_levels_beside_a_moving_lining_change_its_motion_little(kind):
     rises = []
     for local in (True, False):

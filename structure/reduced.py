@@ -1,0 +1,160 @@
+"""A ring of few coordinates that another program may move step by step, reduced from a lining model without a loss.
+
+Whatever the joints do, a ring at rest obeys (K + J^T k J) q = f + J^T (k J q - s), with K the stiffness of its
+segments, J the jumps of its joints, s the forces in them and k any springs in their place. So all its equilibria are
+sums of answers of the ring with these springs: to the loads on its face, and to a pair of forces at every joint. The
+first are taken as harmonics, which is the only error; beside these the ring moves as a whole.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from structure.discrete import DiscreteLining
+from structure.joint_laws import JointLaw
+from structure.lining import THETA
+
+#: Angles of the outer face at which displacements are kept; linear in between.
+FACE = np.radians(np.arange(0, 360, 0.5))
+#: Share of the largest eigenvalue of their scalar products below which answers count as combinations of the others.
+DEPENDENT = 1e-12
+
+
+class ReducedRing:
+    """Mass, stiffness, weight and joints of a ring in m coordinates, per metre of tunnel.
+
+    The first three move the ring to the right, up, and clockwise by one over the radius of the centre line [m]; the
+    others deform it, in the mean of their squares by 1 m, and are orthogonal in mass to the first and to each other.
+
+    Parameters
+    ----------
+    lining : DiscreteLining
+        Its soil springs are left out: it is for the caller to say what works on the ring.
+    density : float
+        Of the concrete [kg/m3].
+    gravity : float
+        [m/s2]
+    n_harmonics : int
+        Of pressure and shear on the outer face whose equilibria are exact; at least 2.
+
+    Attributes
+    ----------
+    mass, stiffness : (m, m) float64
+        [kg/m], [N/m2]; the stiffness is that of the segments, and of the joints where their law is linear.
+    weight : (m,) float64
+        [N/m]
+    jumps : (n_joints, 3, m) float64
+        Opening [m], dislocation [m] and rotation [rad] of the joints.
+    joints_linear : bool
+        Whether the stiffness contains the joints; else :meth:`joint_forces` gives what they add.
+    """
+
+    def __init__(self, lining: DiscreteLining, density: float, gravity: float, n_harmonics: int = 8):
+        ring, parts = lining.ring, lining.parts
+        self.ring, self.outer_radius, self.radius = ring, ring.outer_radius, ring.centre_radius
+        self.law = JointLaw(ring)
+        self.joints_linear = self.law.linear
+        mass, rigid = density * parts.mass, parts.rigid.T
+        deformed = _orthonormal(_answers(lining, mass, rigid, n_harmonics), mass)
+        deformed *= np.sqrt(mass_of_ring := float(rigid[:, 0] @ (mass @ rigid[:, 0])))
+        self.basis = np.hstack([rigid, deformed])
+        self.mass = np.zeros((self.basis.shape[1],) * 2)
+        self.mass[:3, :3] = rigid.T @ (mass @ rigid)
+        np.fill_diagonal(self.mass[3:, 3:], mass_of_ring)
+        self.weight = -gravity * (self.basis.T @ (mass @ rigid[:, 1]))
+        held = parts.segments
+        if parts.ties is not None:
+            held = held + parts.tie_stiffness * (parts.ties.T @ parts.ties)
+        if self.law.linear and parts.linear_joints is not None:
+            held = held + parts.linear_joints
+        self.stiffness = np.zeros_like(self.mass)
+        self.stiffness[3:, 3:] = deformed.T @ (held @ deformed)
+        jumps = parts.jumps @ self.basis
+        jumps[:, :3] = 0.0
+        self.jumps = jumps.reshape(-1, 3, self.basis.shape[1])
+        self._readings = [part @ self.basis for part in lining.readings.forces]
+        arc = self.outer_radius * FACE[1]
+        inward, clockwise = lining.tractions(FACE)
+        self._outward, self._clockwise = -(inward.T @ deformed) / arc, (clockwise.T @ deformed) / arc
+
+    def motion(self, theta: np.ndarray, radius: np.ndarray | float) -> np.ndarray:
+        """Displacement (x to the right, y up) of points at theta [rad] and radius [m] for unit coordinates: (n, 2, m).
+
+        Radii other than that of the outer face move with a plane section.
+        """
+        theta = np.asarray(theta, float)
+        lever = (np.broadcast_to(radius, theta.shape) - self.outer_radius) / self.outer_radius
+        outward, along = self._on_face(theta)
+        ahead, behind = self._on_face(theta + FACE[1])[0], self._on_face(theta - FACE[1])[0]
+        slope = (ahead - behind) / (2 * np.sin(FACE[1]))  # exact for the ring as a whole
+        along = along + lever[:, None] * (along - slope)
+        sine, cosine = np.sin(theta), np.cos(theta)
+        result = np.zeros((len(theta), 2, len(self.weight)))
+        result[:, 0, 0] = result[:, 1, 1] = 1.0
+        turned = np.broadcast_to(radius, theta.shape) / self.radius
+        result[:, 0, 2], result[:, 1, 2] = turned * cosine, -turned * sine
+        result[:, 0, 3:] = sine[:, None] * outward + cosine[:, None] * along
+        result[:, 1, 3:] = cosine[:, None] * outward - sine[:, None] * along
+        return result
+
+    def _on_face(self, theta):
+        place = (theta % (2 * np.pi)) / FACE[1]
+        first = np.floor(place).astype(int)
+        share, first = (place - first)[:, None], first % len(FACE)
+        second = (first + 1) % len(FACE)
+        return tuple((1 - share) * part[first] + share * part[second] for part in (self._outward, self._clockwise))
+
+    def joint_forces(self, displacement: np.ndarray, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Forces that hold the joints as they are, on the coordinates, where their law is not linear.
+
+        Parameters
+        ----------
+        displacement : (m,) float64
+            [m]
+        slip : (n_joints,) float64
+            Irreversible dislocations before [m].
+
+        Returns
+        -------
+        force, tangent, slip : (m,), (m, m), (n_joints,) float64
+        """
+        axial, shear, moment, tangent, slip = self.law.forces(self.jumps @ displacement, slip)
+        force = np.einsum("jkm,jk->m", self.jumps, np.stack([-axial, shear, moment], axis=-1))
+        return force, np.einsum("jkm,jkn->mn", self.jumps, tangent @ self.jumps), slip
+
+    def internal_forces(self, displacement: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """N, Q [N/m] and M [N m/m] at theta [rad], (n,) float64 each; signs: `structure.response`."""
+        around = np.degrees(theta)
+        return tuple(np.interp(around, THETA, part @ displacement, period=360.0) for part in self._readings)
+
+
+def _answers(lining: DiscreteLining, mass: sparse.csr_array, rigid: np.ndarray, n_harmonics: int) -> np.ndarray:
+    """Displacements without those of the ring as a whole, (n, n_answers): to harmonics on the face and to joint forces.
+
+    What a load has left over accelerates the ring as a whole; where loads balance each other so do these forces.
+    """
+    ring, parts = lining.ring, lining.parts
+    springs = np.array([ring.axial_stiffness, ring.axial_stiffness, ring.bending_stiffness]) / ring.centre_radius
+    joints = parts.jumps.T @ sparse.diags_array(np.tile(springs, parts.jumps.shape[0] // 3)) @ parts.jumps
+    held, carried = (parts.segments + joints).tocsr(), mass @ rigid
+    phase = np.outer(FACE, np.arange(n_harmonics + 1))
+    harmonics = np.hstack([np.cos(phase), np.sin(phase[:, 1:])])
+    loads = np.hstack([*(part @ harmonics for part in lining.tractions(FACE)), parts.jumps.T.toarray()])
+    loads = loads / np.abs(loads).max(axis=0)
+    loads -= carried @ np.linalg.solve(rigid.T @ carried, rigid.T @ loads)
+    # Held at three displacements of two nodes a quarter apart, which takes no force from loads in balance.
+    quarter = int(np.argmin(np.abs((parts.node_angle - parts.node_angle[0]) % (2 * np.pi) - np.pi / 2)))
+    free = np.setdiff1d(np.arange(len(rigid)), [*parts.nodes[0], parts.nodes[quarter, 0]])
+    answers = np.zeros_like(loads)
+    answers[free] = splu(held[free][:, free].tocsc()).solve(loads[free])
+    return answers - rigid @ np.linalg.solve(rigid.T @ carried, carried.T @ answers)
+
+
+def _orthonormal(columns: np.ndarray, mass: sparse.csr_array) -> np.ndarray:
+    """Combinations of columns, orthonormal in mass, without those that depend on the others."""
+    columns = columns / np.sqrt(np.sum(columns * (mass @ columns), axis=0))
+    sizes, ways = np.linalg.eigh(columns.T @ (mass @ columns))
+    kept = sizes > DEPENDENT * sizes[-1]
+    return columns @ (ways[:, kept] / np.sqrt(sizes[kept]))
