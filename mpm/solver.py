@@ -3,6 +3,7 @@
 import math
 import os
 from concurrent.futures import wait
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -47,7 +48,7 @@ from mpm.step.substep import (
 from mpm.step.system import Cuts, Ground, Layout, Medium, Needs, Net, System, Tally, Walls
 from mpm.tables import element_geometry, element_neighbours, outflow_nodes
 from mpm.walls.contact import FIXED_X, FIXED_Y
-from mpm.walls.moving import MovingLinings
+from mpm.walls.moving import MovingLinings, NoJointEquilibrium
 from mpm.walls.nodes import contact_nodes, nodes_of_moving_linings
 from mpm.walls.sides import sides_of
 
@@ -316,9 +317,10 @@ class Solver(Measures):
 
     def _relax(self, friction, progress):
         numerics = self.scene.numerics
-        steps, residual, self.impulse[:] = relaxation.relax(
-            self, friction, numerics.relaxation_tolerance, numerics.max_relaxation_steps, progress
-        )
+        with self._joints_in_equilibrium():
+            steps, residual, self.impulse[:] = relaxation.relax(
+                self, friction, numerics.relaxation_tolerance, numerics.max_relaxation_steps, progress
+            )
         self._mapped = False
         for name in ("soil", "water"):
             self.impulse[f"{name}_squared"] = self.impulse[name] ** 2
@@ -423,8 +425,19 @@ class Solver(Measures):
         self._run(PLAN, PLAN, batch)
         substeps = batch.substeps[0]
         for k in range(substeps):
-            self.moving.advance(self.system(), float(self.clock.dt_of_level[0]))  # that of all nodes on moving linings
+            with self._joints_in_equilibrium():
+                self.moving.advance(self.system(), float(self.clock.dt_of_level[0]))  # that of all nodes on them
             self._run(SOLVE, UPDATE, Batch.one_substep(k, substeps))
+
+    @contextmanager
+    def _joints_in_equilibrium(self):
+        """Say where and when the joints of a moving lining found none."""
+        try:
+            yield
+        except NoJointEquilibrium as problem:
+            raise RunFailed(
+                str(problem), self.clock.time, self.mesh.nodes[self.mesh.outer_nodes[0]].mean(axis=0)
+            ) from problem
 
     def _run(self, first_pass, last_pass, batch=None, advance=True):
         """Some passes (`mpm.step.substep.PASSES`) of all substeps, by all threads; None: of a long step planned."""

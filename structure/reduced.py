@@ -1,9 +1,10 @@
 """A ring of few coordinates that another program may move step by step, reduced from a lining model without a loss.
 
 Whatever the joints do, a ring at rest obeys (K + J^T k J) q = f + J^T (k J q - s), with K the stiffness of its
-segments, J the jumps of its joints, s the forces in them and k any springs in their place. So all its equilibria are
-sums of answers of the ring with these springs: to the loads on its face, and to a pair of forces at every joint. The
-first are taken as harmonics, which is the only error; beside these the ring moves as a whole.
+segments (and of gaps that are not plane), J the jumps of its joints, s the forces in them and k any springs in their
+place. So all its equilibria are sums of answers of the ring with these springs: to the loads on its face, and to a pair
+of forces at every joint. The first are taken as harmonics, which is the only error; beside these the ring moves as a
+whole.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from scipy.sparse.linalg import splu
 from structure.discrete import DiscreteLining
 from structure.joint_laws import JointLaw
 from structure.lining import THETA
+from structure.ring_forces import uneven_gaps
 
 #: Angles of the outer face at which displacements are kept; linear in between.
 FACE = np.radians(np.arange(0, 360, 0.5))
@@ -67,7 +69,9 @@ class ReducedRing:
         held = parts.segments
         if parts.ties is not None:
             held = held + parts.tie_stiffness * (parts.ties.T @ parts.ties)
-        if self.law.linear and parts.linear_joints is not None:
+        if not self.law.linear:
+            held = held + uneven_gaps(ring, parts)
+        elif parts.linear_joints is not None:
             held = held + parts.linear_joints
         self.stiffness = np.zeros_like(self.mass)
         self.stiffness[3:, 3:] = deformed.T @ (held @ deformed)
@@ -138,7 +142,7 @@ def _answers(lining: DiscreteLining, mass: sparse.csr_array, rigid: np.ndarray, 
     ring, parts = lining.ring, lining.parts
     springs = np.array([ring.axial_stiffness, ring.axial_stiffness, ring.bending_stiffness]) / ring.centre_radius
     joints = parts.jumps.T @ sparse.diags_array(np.tile(springs, parts.jumps.shape[0] // 3)) @ parts.jumps
-    held, carried = (parts.segments + joints).tocsr(), mass @ rigid
+    held, carried = (parts.segments + uneven_gaps(ring, parts) + joints).tocsr(), mass @ rigid
     phase = np.outer(FACE, np.arange(n_harmonics + 1))
     harmonics = np.hstack([np.cos(phase), np.sin(phase[:, 1:])])
     loads = np.hstack([*(part @ harmonics for part in lining.tractions(FACE)), parts.jumps.T.toarray()])

@@ -79,6 +79,15 @@ def whole_movements(size: int, nodes: np.ndarray, angle: np.ndarray, lever: np.n
     return moved
 
 
+def uneven_gaps(ring: Ring, parts: RingParts) -> sparse.csr_array:
+    """What joints store in a gap beyond their jumps, (n, n): linear whatever their law; nothing where faces stay plane."""
+    if parts.linear_joints is None:
+        return sparse.csr_array(parts.segments.shape)
+    springs = ring.joint_normal_stiffness, ring.joint_shear_stiffness, ring.joint_rotational_stiffness
+    even = parts.jumps.T @ sparse.diags_array(np.tile(springs, parts.jumps.shape[0] // 3)) @ parts.jumps
+    return (parts.linear_joints - even).tocsr()
+
+
 class RingForces:
     """Segments, joints and soil springs of a ring in one set of unknowns.
 
@@ -96,7 +105,7 @@ class RingForces:
         self.joints = JointLaw(ring)
         self.unslipped = np.zeros(len(ring.joint_angles))
         linear = parts.segments if parts.linear_joints is None else (parts.segments + parts.linear_joints).tocsr()
-        constant = linear if self.joints.linear else parts.segments
+        constant = linear if self.joints.linear else parts.segments + uneven_gaps(ring, parts)
         if parts.ties is None:
             bolts = sparse.csr_array(linear.shape)
         else:

@@ -23,6 +23,7 @@ from mpm.walls.rings import BETA, ElasticRing, RigidRing, effective_mass
 
 MAX_ITERATIONS = 100
 MAX_JOINT_ITERATIONS = 50
+MOST_MISSED = 1e-3  # of the force of joints at which a step may end, for the next one to make up
 ROUNDINGS = 16  # of the largest term of a joint's force, that no residual gets below
 SMALLEST_SHARE = 1e-3  # of Newton's step
 TOLERANCE = 1e-11  # of the largest term of an equation: round-off of its sum
@@ -222,6 +223,10 @@ def ring_impulse(stiffness, weight, displacement, dt, due):
         due[i] = dt * force
 
 
+class NoJointEquilibrium(ArithmeticError):
+    """Joints whose forces could not be found in a step; the message says whose."""
+
+
 class MovingLinings:
     """The linings of a scene that may move, and the velocities of their contact nodes.
 
@@ -284,34 +289,47 @@ class MovingLinings:
             ring = part.ring
             self._gather(system, dt, part.rows, self.node_of_contact, part.state)
             ring_impulse(ring.stiffness, ring.weight, part.displacement, dt, part.due)
-            if ring.joints_linear:
-                self._solve(part, system.walls.contact, effective_mass(ring, dt), part.due)
-            else:
-                self._solve_with_joints(part, system.walls.contact, dt)
+            mass = effective_mass(ring, dt)
+            self._solve(self._find, part, system.walls.contact, mass, dt, part.displacement, BETA * dt)
             part.displacement += dt * part.velocity
 
-    def _solve(self, part, contact, mass, due):
-        self._find(
-            part.state, part.rows, part.motion, contact, mass, due, part.velocity, part.left, self.wall
-        )  # fmt: skip
-
-    def _solve_with_joints(self, part, contact, dt):
-        """The ring's velocity where its joints are not linear: their forces linearised where they were found last."""
-        ring, before, owed = part.ring, part.velocity.copy(), part.left.copy()
-        place = part.displacement
+    def _solve(self, find, part, contact, mass, dt, start, share):
+        """The ring's velocity; forces of joints that are not linear, of the place `start` + `share` times its change,
+        are linearised where they were found last, halfway back where they miss by more than before.
+        """
+        ring, velocity, left = part.ring, part.velocity, part.left
+        if ring.joints_linear:
+            find(part.state, part.rows, part.motion, contact, mass, part.due, velocity, left, self.wall)
+            return
+        before, owed, place = velocity.copy(), left.copy(), start
         force, tangent, remembered = ring.joint_forces(place, part.memory)
+        least = np.inf
         for _ in range(MAX_JOINT_ITERATIONS):
-            due = part.due - dt * (force - tangent @ (place - part.displacement))
-            part.velocity[:], part.left[:] = before, owed
-            self._solve(part, contact, effective_mass(ring, dt, tangent), due)
-            last, size = place, np.abs(force) + np.abs(tangent) @ np.abs(place)
-            place = part.displacement + BETA * dt * (part.velocity - before)
-            expected = force + tangent @ (place - last)
-            force, tangent, remembered = ring.joint_forces(place, part.memory)
-            missed = force - expected
+            due = part.due - dt * (force - tangent @ (place - start))
+            velocity[:], left[:] = before, owed
+            find(
+                part.state, part.rows, part.motion, contact, mass + dt * share * tangent, due, velocity, left,
+                self.wall,
+            )  # fmt: skip
+            found = start + share * (velocity - before)
+            expected, size = force + tangent @ (found - place), np.abs(force) + np.abs(tangent) @ np.abs(place)
+            actual, slope, remembered = ring.joint_forces(found, part.memory)
+            missed = actual - expected
             if np.all(np.abs(missed) <= ROUNDINGS * np.finfo(float).eps * size):
                 break
-        part.left += dt * missed
+            miss = np.linalg.norm(missed)
+            if miss < least:
+                least, place, force, tangent = miss, found, actual, slope
+            else:
+                place = 0.5 * (place + found)
+                force, tangent, _ = ring.joint_forces(place, part.memory)
+        else:
+            if not np.linalg.norm(missed) <= MOST_MISSED * np.linalg.norm(actual):
+                raise NoJointEquilibrium(
+                    f"the joints of tunnel {part.tunnel} found no equilibrium with their ring and the ground: lower "
+                    "ring.joint_rotational_stiffness, or leave joint_contact_height out"
+                )
+        left += dt * missed
         part.memory[:] = remembered
 
     def settle(self, force, held_liquid, mass, velocity, contact):
@@ -344,15 +362,10 @@ class MovingLinings:
             ring_mass = ring.mass * (mass[nodes].sum() / ring.mass.diagonal().max())
             before = part.velocity.copy()
             ring_impulse(ring.stiffness, ring.weight, part.displacement + before, 1.0, part.due)
-            held = ring.stiffness
-            if not ring.joints_linear:
-                force, tangent, _ = ring.joint_forces(part.displacement + before, part.memory)
-                part.due -= force
-                held = held + tangent
             part.due -= np.einsum("kdm,kd,k->m", part.motion, n, water)
-            self._find_dry(
-                part.state, rows, part.motion, contact, ring_mass + held, part.due, part.velocity, part.left, self.wall
-            )  # fmt: skip
+            remembered = part.memory.copy()
+            self._solve(self._find_dry, part, contact, ring_mass + ring.stiffness, 1.0, part.displacement + before, 1.0)
+            part.memory[:] = remembered
             part.displacement += part.velocity
             momentum = np.einsum("ij,j->i", ring_mass, part.velocity)
             energy += float(np.sum(part.velocity * momentum))

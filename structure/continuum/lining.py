@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -86,7 +86,7 @@ class ContinuumLining(DiscreteLining):
         groove = None if groove is None else GasketGroove(*groove)
         bolts = None if bolts is None else Bolts(*bolts)
         check_ring(ring)
-        _refuse_unsupported(ring)
+        _refuse_unsupported(ring, joint)
         _refuse_options(ring, columns, layers, joint, strip_width, gate)
         if groove is not None:
             _check_groove(ring, joint, groove)
@@ -259,14 +259,13 @@ class ContinuumLining(DiscreteLining):
         return attributes
 
 
-def _refuse_unsupported(ring: Ring):
+def _refuse_unsupported(ring: Ring, joint: str):
     """Refuse options of the ring that this model does not know, rather than leave them out silently."""
-    known = {
-        "section": ("timoshenko", "always deforms in shear"),
-        "joint_contact_only": (False, "has linear joints only"),
-        "joint_contact_height": (None, "has linear joints only"),
-        "joint_friction_coefficient": (None, "has linear joints only"),
-    }
+    known: dict[str, tuple[Any, str]] = {"section": ("timoshenko", "always deforms in shear")}
+    if joint == "equivalent_strip":
+        linear = "whose strips are linear; take zero-thickness joints"
+        known |= dict.fromkeys(("joint_contact_height", "joint_friction_coefficient"), (None, linear))
+        known["joint_contact_only"] = (False, linear)
     for name, (value, reason) in known.items():
         given = getattr(ring, name)
         if given != value:
