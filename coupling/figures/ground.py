@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-FULL = 0.6  # of an element's area that material fills where the element is drawn as a whole
+FULL = 0.6  # of the area around an element that material fills where the element is drawn as a whole
 FIELD_COLOURS = ("viridis", "magma_r", "YlGnBu", "cividis")  # of displacement, strain, pore pressure, stress
 
 
@@ -136,21 +136,35 @@ def mesh_near_gate(mesh: xr.Dataset, half_width: float | None = None) -> Picture
 
 
 class _Full(NamedTuple):
-    """Elements that material fills: corners (n, 3, 2) [m], and in which of them each point lies, -1 for none."""
+    """Elements that material fills: nodes (n, 3), corners (n, 3, 2) [m], in which of them each point lies, -1: none."""
 
+    nodes: NDArray[np.int64]
     corners: NDArray[np.float64]
     of_point: NDArray[np.int64]
 
 
 def _full_elements(data, mesh):
+    """Elements in ground that is full: an element that few points happen to lie in is no hole among full ones."""
     place = xr.Dataset({name: ("point", data[name]) for name in ("x", "y")})
-    element, areas = element_of_points(place, mesh), element_areas(mesh)
+    element, areas, nodes = element_of_points(place, mesh), element_areas(mesh), mesh["element_nodes"].values
     inside = element >= 0
-    full = np.bincount(element[inside], data["volume"][inside], len(areas)) >= FULL * areas
+    filled = np.bincount(element[inside], data["volume"][inside], len(areas)) / areas
+    at_nodes = cell_means(nodes.ravel(), np.repeat(areas, 3), np.repeat(filled, 3), mesh.sizes["node"])
+    full = at_nodes[nodes].mean(axis=1) >= FULL
     number = np.where(full, np.cumsum(full) - 1, -1)
-    nodes = mesh["element_nodes"].values[full]
-    corners = np.stack([mesh["x"].values[nodes], mesh["y"].values[nodes]], axis=2)
-    return _Full(corners, np.where(inside, number[element], -1))
+    corners = np.stack([mesh["x"].values[nodes[full]], mesh["y"].values[nodes[full]]], axis=2)
+    return _Full(nodes[full], corners, np.where(inside, number[element], -1))
+
+
+def _means(full, volume, values):
+    """Means of the points in full elements; those without a point take that of their nodes."""
+    means = cell_means(full.of_point, volume, values, len(full.nodes))
+    nodes, known = full.nodes, np.repeat(np.isfinite(means), 3)
+    at_nodes = cell_means(
+        nodes.ravel()[known], np.ones(known.sum()), np.repeat(means, 3)[known], nodes.max(initial=0) + 1
+    )
+    around = np.ma.masked_invalid(at_nodes[nodes]).mean(axis=1)
+    return np.where(np.isfinite(means), means, around.filled(np.nan))
 
 
 def _draw_values(axis, data, values, colours, norm, full):
@@ -158,7 +172,7 @@ def _draw_values(axis, data, values, colours, norm, full):
     style = {"cmap": colours, "norm": norm, "rasterized": True, "zorder": 2}
     shown = np.arange(len(values))
     if full is not None:
-        means = cell_means(full.of_point, data["volume"], values, len(full.corners))
+        means = _means(full, data["volume"], values)
         # an edge in the colour of its element leaves no hairline between two
         axis.add_collection(PolyCollection(full.corners, array=means, edgecolors="face", linewidths=0.25, **style))
         shown = np.flatnonzero(full.of_point < 0)

@@ -134,6 +134,13 @@ def test_full_elements_show_the_mean_of_their_points_and_others_the_points():
     assert figure.axes[2].get_title() == "pore pressure [kPa]"
     np.testing.assert_allclose(elements.get_array(), [3.0])
     np.testing.assert_allclose(discs.get_array(), [9.0])
+    # an element among full ones that no point happens to lie in takes the mean of its nodes
+    moved = points.assign(x=("point", [0.5, 0.45, 0.8, 0.9, 0.2]), y=("point", [0.3, 0.35, 0.5, 0.5, 0.9]))
+    thirds = np.vstack([square[:3], [[2 / 3, 1 / 3]]])
+    mesh = xr.Dataset({"x": ("node", thirds[:, 0]), "y": ("node", thirds[:, 1]),
+                       "element_nodes": (("element", "corner"), [[0, 1, 3], [1, 2, 3], [2, 0, 3]])})  # fmt: skip
+    elements = figures.fields_around_tunnel(moved, mesh=mesh).axes[2].collections[0]
+    np.testing.assert_allclose(elements.get_array(), [3.0, 4.5, 1.5])
     # what has not moved is drawn at the lower end of a logarithmic scale, not left white
     assert figure.axes[0].collections[0].get_array().min() == 1.0
 
