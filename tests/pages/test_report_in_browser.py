@@ -221,6 +221,7 @@ def test_ring_is_drawn_with_its_joints_in_numbers(opened):
     numbers = opened.evaluate("[...document.querySelectorAll('.drawing .number')].map(e => e.textContent)")
     assert numbers == ["1", "2", "3", "4", "5", "6"]
     assert opened.evaluate("document.querySelectorAll('.drawing .key').length") == 1
+    assert len(drawn(opened, "bending_moment", "numbers")[0]) == 6  # draws what is out of sight, too
     chart = "echarts.getInstanceByDom(document.getElementById('bending_moment'))"
     marks = f"{chart}.getOption().series.find(s => s.id === 'numbers').data"
     assert opened.evaluate(f"{marks}.map(p => p.label.formatter)") == numbers
