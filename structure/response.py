@@ -93,8 +93,10 @@ SHOWN = {
     "joint_dislocation": Shown("joint dislocation", "joint dislocation", "mm", 1e3),
     "joint_rotation": Shown("joint rotation", "joint rotation", "mrad", 1e3),
     "convergence_horizontal": Shown(
-        "convergence", "horizontal diameter shorter (+) or longer (\N{MINUS SIGN})", "mm", 1e3
+        "horizontal convergence", "horizontal diameter shorter (+) or longer (\N{MINUS SIGN})", "mm", 1e3
     ),
-    "convergence_vertical": Shown("convergence", "vertical diameter shorter (+) or longer (\N{MINUS SIGN})", "mm", 1e3),
+    "convergence_vertical": Shown(
+        "vertical convergence", "vertical diameter shorter (+) or longer (\N{MINUS SIGN})", "mm", 1e3
+    ),
     "settlement": Shown("settlement", "settlement", "mm", 1e3),
 }

@@ -173,17 +173,10 @@ def _print_models(data):
 
 
 def _differences_table(rows, title):
+    from coupling.responses.comparison import HEADS, difference_cells
+
     causes = any(row["cause"] for row in rows)
-    heads = ("quantity", "largest difference", "of the extreme", "where", "when")
-    table = Table(*heads, *(("known cause",) if causes else ()), title=title)
+    table = Table(*HEADS, *(("known cause",) if causes else ()), title=title)
     for row in rows:
-        angle = "-" if row["theta"] is None else f"{row['theta']:.4g} deg"
-        cells = (
-            row["label"],
-            f"{row['difference'] * row['scale']:+.3g} {row['unit']}",
-            f"{100 * row['relative']:.2f} %",
-            angle if row["joint"] is None else f"joint {row['joint']}",
-            f"{row['time']:.3g} s",
-        )
-        table.add_row(*cells, *((row["cause"] or "-",) if causes else ()))
+        table.add_row(*difference_cells(row), *((row["cause"] or "-",) if causes else ()))
     return table

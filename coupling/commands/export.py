@@ -11,11 +11,19 @@ from coupling.commands.options import Run
 
 def export_command(
     run: Run,
-    kind: Annotated[str, typer.Option("--format", help="vtu or xdmf for ParaView, gif for an animation.")] = "vtu",
-    out: Annotated[Path | None, typer.Option(help="Folder; fields in the run's folder when left out.")] = None,
+    kind: Annotated[
+        str,
+        typer.Option(
+            "--format",
+            help="vtu, xdmf for ParaView; gif, an animation; csv, xlsx, tables; png, svg, pdf, pictures.",
+        ),
+    ] = "vtu",
+    out: Annotated[
+        Path | None, typer.Option(help="Folder; fields, tables or figures in the run's folder when left out.")
+    ] = None,
     json_path: JsonPath = None,
 ):
-    """Write points and mesh of a run over time as files for ParaView, or as an animation.
+    """Write a run for other programs: fields over time for ParaView, an animation, tables, or pictures.
 
     JSON: `run`, `format`, `files` (paths to open).
     """

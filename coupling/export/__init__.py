@@ -1,4 +1,4 @@
-"""Points and mesh of a run over time as files for ParaView and PyVista, and as an animation."""
+"""A run for other programs: fields over time for ParaView and PyVista, an animation, tables, pictures."""
 
 from __future__ import annotations
 
@@ -9,29 +9,39 @@ from pathlib import Path
 from coupling.datasets import RunFileError, opened, read_mesh, read_points, read_run
 from coupling.export.animation import animation
 from coupling.export.grids import mesh_grids, point_grid, ring_series
-from coupling.files.folder import FIELDS
+from coupling.export.tables import EXCEL_FILE, write_tables
+from coupling.export.tables import NAMES as TABLE_NAMES
+from coupling.figures.of_run import NAMES as PICTURE_NAMES
+from coupling.figures.of_run import draw_run
+from coupling.files.folder import FIELDS, FIGURES, TABLES
 from coupling.refused import Refused
 
+PICTURES = ("png", "svg", "pdf")
 #: Format: names of the files it writes, replaced by the next export into the same folder.
 FILES = {
     "vtu": tuple(f"{stem}{end}" for stem in ("points", "mesh", "lining", "ring_*") for end in ("_*.vtu", ".pvd")),
     "xdmf": tuple(f"{stem}{end}" for stem in ("points", "mesh", "lining", "ring_*") for end in (".xdmf", ".h5")),
     "gif": ("gushing.gif",),
+    "csv": tuple(f"{name}.csv" for name in TABLE_NAMES),
+    "xlsx": (EXCEL_FILE,),
+    **{kind: tuple(f"{name}{end}.{kind}" for name in PICTURE_NAMES for end in ("", "_tunnel_*")) for kind in PICTURES},
 }
 
 
 def export(run: str | Path, kind: str, out: str | Path | None = None) -> list[Path]:
-    """Write the fields of a run.
+    """Write a run for other programs.
 
     Parameters
     ----------
     run : str or path
-        Run folder or file with snapshots of the points.
-    kind : {"vtu", "xdmf", "gif"}
+        Run folder or file; for fields and animation with snapshots of the points.
+    kind : {"vtu", "xdmf", "gif", "csv", "xlsx", "png", "svg", "pdf"}
         "vtu": a file a time and `.pvd` series; "xdmf": series with their HDF5 files; "gif": an animation. A series each
-        of the points, of the mesh, of the pressures on the lining, and of the forces of every lining model.
+        of the points, of the mesh, of the pressures on the lining, and of the forces of every lining model. "csv",
+        "xlsx": see :func:`coupling.export.tables.run_tables`; "png", "svg", "pdf": the pictures of `gush run`.
     out : str or path, optional
-        Folder; `fields` in the run's folder when left out. Files of an earlier export are replaced, nothing else.
+        Folder; `fields`, `tables` or `figures` in the run's folder when left out. Files of an earlier export are
+        replaced, nothing else.
 
     Returns
     -------
@@ -41,25 +51,31 @@ def export(run: str | Path, kind: str, out: str | Path | None = None) -> list[Pa
     Raises
     ------
     RunFileError
-        No run, or no snapshots.
+        No run, or no snapshots of its points for fields.
     Refused
-        An unknown format, or a folder with other files.
+        An unknown format, a folder with other files, or Excel without openpyxl.
     """
     if kind not in FILES:
         raise Refused(f"export: format must be one of {', '.join(FILES)}, got '{kind}'")
     with opened(run) as file:
-        return _exported(file, kind, out)
+        if kind in ("csv", "xlsx"):
+            return write_tables(file, _prepared(file, out, kind, TABLES), kind)
+        if kind in PICTURES:
+            return draw_run(file, _prepared(file, out, kind, FIGURES), kind)
+        return _fields(file, kind, out)
 
 
-def _exported(file, kind, out):
+def _fields(file, kind, out):
     points = read_points(file)
     if "x" not in points or not points.sizes.get("time"):
         raise RunFileError(
             f"run file '{file.path}': holds no snapshot of the points, nothing can be exported; did the "
             "scene say output.points = false, or is the run at its beginning?"
         )
-    folder = _prepared(file.path.parent / FIELDS if out is None else Path(out), kind)
+    folder = _prepared(file, out, kind, FIELDS)
     if kind == "gif":
+        with contextlib.suppress(RunFileError):
+            return [animation(points, folder / "gushing.gif", read_mesh(file))]
         return [animation(points, folder / "gushing.gif")]
     write = _write_vtu if kind == "vtu" else _write_xdmf
     times, shots = points["time"].values, [points.isel(time=k) for k in range(points.sizes["time"])]
@@ -92,15 +108,16 @@ def _write_xdmf(stem, times, grids):
     return path
 
 
-def _prepared(folder, kind):
-    """The folder, made or emptied of an earlier export of that format."""
+def _prepared(file, out, kind, home):
+    """The folder, `out` or that of the run, made or emptied of an earlier export of that format."""
+    folder = file.path.parent / home if out is None else Path(out)
     known = [pattern for patterns in FILES.values() for pattern in patterns]
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except FileExistsError:
         raise Refused(f"export folder '{folder}': it, or one above it, is a file; choose another --out") from None
     strange = [p.name for p in folder.iterdir() if not any(fnmatch.fnmatch(p.name, known_) for known_ in known)]
-    if strange:
+    if strange and not (out is None and home == FIGURES):  # other commands draw there, too
         raise Refused(f"export folder '{folder}': holds other files ({strange[0]}); choose another --out")
     for pattern in FILES[kind]:
         for earlier in folder.glob(pattern):

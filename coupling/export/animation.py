@@ -10,7 +10,7 @@ from coupling.refused import Refused
 SECONDS_OF_ANIMATION, LONGEST_FRAME, LAST_FRAME = 6.0, 0.5, 1.5
 
 
-def animation(points, path):
+def animation(points, path, mesh=None):
     """Fields around the tunnel, one picture a snapshot, colours the same at all times."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
@@ -21,7 +21,7 @@ def animation(points, path):
         raise Refused("export: an animation shows the surroundings of a tunnel, the scene has none; take vtu")
     tops, pictures = common_tops(points), []
     for k in range(points.sizes["time"]):
-        canvas = FigureCanvasAgg(fields_around_tunnel(points.isel(time=k), tops=tops))
+        canvas = FigureCanvasAgg(fields_around_tunnel(points.isel(time=k), tops=tops, mesh=mesh))
         canvas.draw()
         pictures.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
     frame = int(1000 * min(LONGEST_FRAME, SECONDS_OF_ANIMATION / len(pictures)))

@@ -10,10 +10,11 @@ from coupling.figures.of_run import draw_run
 from coupling.figures.picture import GATE, INITIAL, NOW, RESOLUTION, SECOND, STYLE, Picture
 from coupling.figures.residuals import residuals
 from coupling.figures.ring import deformed_ring, internal_forces, pressures_polar
+from coupling.figures.settlement import settlement_trough
 from coupling.figures.utilisations import checks
 
 __all__ = [
     "GATE", "INITIAL", "NOW", "Picture", "RESOLUTION", "SECOND", "STYLE", "checks", "common_tops", "deformed_ring",
     "draw_run", "fields_around_tunnel", "forces_compared", "inflow", "internal_forces", "joints_compared",
-    "mesh_near_gate", "pressures_polar", "residuals",
+    "mesh_near_gate", "pressures_polar", "residuals", "settlement_trough",
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Pictures of two lining models side by side, each a function of their responses."""
+"""Pictures of lining models side by side, each a function of their responses."""
 
 import matplotlib
 import numpy as np
@@ -6,6 +6,7 @@ from matplotlib.lines import Line2D
 
 from coupling.figures.picture import STYLE, Picture
 from coupling.figures.polar import around_zero, at_time, closed_curve, crown_up, legend_below
+from coupling.figures.tunnel import joints_of, mark_joints
 from structure.response import FORCES, SHOWN
 
 COLOURS, DASHES = ("0.25", "#c1272d"), ("-", (0, (4, 2)))
@@ -14,7 +15,7 @@ JOINTS = ("joint_opening", "joint_dislocation", "joint_rotation")
 
 
 def forces_compared(responses):
-    """N, Q and M around the ring, at the first and the last time, one curve a model.
+    """N, Q and M around the ring at the first and the last time, one curve a model, and how far others are apart.
 
     Parameters
     ----------
@@ -24,14 +25,35 @@ def forces_compared(responses):
     one = next(iter(responses.values()))
     times = [0, -1] if one.sizes["time"] > 1 else [0]
     with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(7.4, 3.0 * len(times) + 0.2), layout="constrained")
-        axes = figure.subplots(len(times), 3, subplot_kw={"projection": "polar"}, squeeze=False)
-        for row, time in zip(axes, times, strict=True):
-            for axis, name in zip(row, FORCES, strict=True):
+        figure = Picture(figsize=(7.4, 3.0 * len(times) + 2.2), layout="constrained")
+        grid = figure.add_gridspec(len(times) + 1, 3, height_ratios=[*[3.0] * len(times), 1.8])
+        for row, time in enumerate(times):
+            for column, name in enumerate(FORCES):
+                axis = figure.add_subplot(grid[row, column], projection="polar")
                 _forces_panel(axis, responses, name, time)
                 axis.set_title(f"{SHOWN[name].label}\n{at_time(one.isel(time=time))}", pad=10)
-        legend_below(figure, axes[0, 0])
+        legend_below(figure, figure.axes[0])
+        for column, name in enumerate(FORCES):
+            _differences_panel(figure.add_subplot(grid[-1, column]), responses, name, times)
     return figure
+
+
+def _differences_panel(axis, responses, name, times):
+    """How far the others are from the first over the angle, at the first time in grey, at the last in colour."""
+    (first_name, first), *others = responses.items()
+    for other_name, other in others:
+        apart = SHOWN[name].scale * (other[name] - first[name])
+        for time, colour in zip(times, ("0.6", COLOURS[1])[-len(times) :], strict=True):
+            axis.plot(apart["theta"], apart.isel(time=time), color=colour, lw=1.0, label=at_time(first.isel(time=time)))
+        axis.set_title(f"{SHOWN[name].short} of {other_name}\nless {first_name} [{SHOWN[name].unit}]")
+    for angle in joints_of(first):
+        axis.axvline(angle, color="0.35", lw=0.6, ls=(0, (1, 2)))
+    axis.set_xlim(0, 360)
+    axis.set_xticks(range(0, 361, 90))
+    axis.set_xlabel("angle from the crown [°]")
+    axis.axhline(0, color="0.2", lw=0.5)
+    axis.grid(True)
+    axis.legend(fontsize=6, loc="best")
 
 
 def _forces_panel(axis, responses, name, time):
@@ -42,6 +64,7 @@ def _forces_panel(axis, responses, name, time):
         axis.plot(*closed_curve(angle, curve.values), color=colour, ls=dash, lw=1.1, label=model)
     axis.plot(np.linspace(0, 2 * np.pi, 181), np.zeros(181), color="0.2", lw=0.6)
     around_zero(axis, *curves.values())
+    mark_joints(axis, joints_of(next(iter(responses.values()))))
 
 
 def joints_compared(responses):

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import matplotlib
 import numpy as np
+import xarray as xr
 from matplotlib.collections import EllipseCollection, PolyCollection
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.ticker import MaxNLocator
@@ -13,12 +14,14 @@ from matplotlib.ticker import MaxNLocator
 from coupling.datasets.geometry import gate_of, tunnel_of
 from coupling.figures.picture import STYLE, Picture
 from coupling.figures.tunnel import draw_linings
+from coupling.postprocess.elements import cell_means, element_areas, element_of_points
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.axes import Axes
+    from numpy.typing import NDArray
 
 
+FULL = 0.6  # of the area around an element that material fills where the element is drawn as a whole
 FIELD_COLOURS = ("viridis", "magma_r", "YlGnBu", "cividis")  # of displacement, strain, pore pressure, stress
 
 
@@ -27,8 +30,12 @@ def fields_around_tunnel(
     half_width: float | None = None,
     tops: dict[str, float] | None = None,
     tunnel: int | None = None,
+    mesh: xr.Dataset | None = None,
 ) -> Picture:
-    """Displacement, deviatoric strain, pore pressure, vertical effective stress (compression positive) on the points.
+    """Displacement, deviatoric strain, pore pressure, vertical effective stress (compression positive).
+
+    Elements show the mean of the points in them, which is as smooth as the computation is accurate; points whose
+    element is not full, at the front of what flows, are drawn by themselves.
 
     Parameters
     ----------
@@ -40,17 +47,20 @@ def fields_around_tunnel(
         Title of a panel to the top of its colours, from :func:`common_tops`; that of this time when left out.
     tunnel : int, optional
         Which one, when there are several; that of the gate when left out.
+    mesh : xarray.Dataset, optional
+        `/mesh` of the run; without it all points are drawn as discs.
     """
     x0, y0, radius, _ = tunnel_of(points, tunnel)
     half = 3.0 * radius if half_width is None else half_width
     data, fields = _fields(points, x0, y0, half)
+    full = None if mesh is None else _full_elements(data, mesh)
     with matplotlib.rc_context(STYLE):
         figure = Picture(figsize=(7.2, 6.4), layout="constrained")
         axes = figure.subplots(2, 2, sharex=True, sharey=True)
         for axis, (title, values, colours, norm, extend) in zip(axes.flat, fields, strict=True):
             if norm is None:
                 norm = Normalize(0.0, _top(values, extend) if tops is None else tops[title])
-            drawn = _draw_points(axis, data, values, colours, norm)
+            drawn = _draw_values(axis, data, np.maximum(values, norm.vmin), colours, norm, full)
             draw_linings(axis, points, zorder=3)
             frame_view(axis, x0, y0, half)
             bar = figure.colorbar(drawn, ax=axis, shrink=0.92, extend=extend, pad=0.02)
@@ -81,7 +91,7 @@ def common_tops(points: xr.Dataset) -> dict[str, float]:
 
 def _fields(points, x0, y0, half):
     """Points in a view, and what is drawn of them: title, values, colour map, norm (None: from 0), open ends."""
-    near = (np.abs(points["x"].values - x0) < 1.1 * half) & (np.abs(points["y"].values - y0) < 1.1 * half)
+    near = (np.abs(points["x"].values - x0) < 1.2 * half) & (np.abs(points["y"].values - y0) < 1.2 * half)
     data = {name: points[name].values[near] for name in points.data_vars if points[name].dims == ("point",)}
     displacement = 1e3 * np.hypot(data["displacement_x"], data["displacement_y"])
     return data, (
@@ -125,14 +135,52 @@ def mesh_near_gate(mesh: xr.Dataset, half_width: float | None = None) -> Picture
     return figure
 
 
-def _draw_points(axis, data, values, colours, norm):
-    """Points as discs in data units, wide enough to close the gaps between elements, the smallest on top."""
-    order = np.argsort(-data["volume"], kind="stable")
+class _Full(NamedTuple):
+    """Elements that material fills: nodes (n, 3), corners (n, 3, 2) [m], in which of them each point lies, -1: none."""
+
+    nodes: NDArray[np.int64]
+    corners: NDArray[np.float64]
+    of_point: NDArray[np.int64]
+
+
+def _full_elements(data, mesh):
+    """Elements in ground that is full: an element that few points happen to lie in is no hole among full ones."""
+    place = xr.Dataset({name: ("point", data[name]) for name in ("x", "y")})
+    element, areas, nodes = element_of_points(place, mesh), element_areas(mesh), mesh["element_nodes"].values
+    inside = element >= 0
+    filled = np.bincount(element[inside], data["volume"][inside], len(areas)) / areas
+    at_nodes = cell_means(nodes.ravel(), np.repeat(areas, 3), np.repeat(filled, 3), mesh.sizes["node"])
+    full = at_nodes[nodes].mean(axis=1) >= FULL
+    number = np.where(full, np.cumsum(full) - 1, -1)
+    corners = np.stack([mesh["x"].values[nodes[full]], mesh["y"].values[nodes[full]]], axis=2)
+    return _Full(nodes[full], corners, np.where(inside, number[element], -1))
+
+
+def _means(full, volume, values):
+    """Means of the points in full elements; those without a point take that of their nodes."""
+    means = cell_means(full.of_point, volume, values, len(full.nodes))
+    nodes, known = full.nodes, np.repeat(np.isfinite(means), 3)
+    at_nodes = cell_means(
+        nodes.ravel()[known], np.ones(known.sum()), np.repeat(means, 3)[known], nodes.max(initial=0) + 1
+    )
+    around = np.ma.masked_invalid(at_nodes[nodes]).mean(axis=1)
+    return np.where(np.isfinite(means), means, around.filled(np.nan))
+
+
+def _draw_values(axis, data, values, colours, norm, full):
+    """Means of full elements; other points as discs in data units, wider than their distance, the smallest on top."""
+    style = {"cmap": colours, "norm": norm, "rasterized": True, "zorder": 2}
+    shown = np.arange(len(values))
+    if full is not None:
+        means = _means(full, data["volume"], values)
+        # an edge in the colour of its element leaves no hairline between two
+        axis.add_collection(PolyCollection(full.corners, array=means, edgecolors="face", linewidths=0.25, **style))
+        shown = np.flatnonzero(full.of_point < 0)
+    order = shown[np.argsort(-data["volume"][shown], kind="stable")]
     size = 1.9 * np.sqrt(data["volume"][order])
     discs = EllipseCollection(
         size, size, np.zeros_like(size), units="xy", offsets=np.stack([data["x"], data["y"]], axis=1)[order],
-        offset_transform=axis.transData, array=values[order], cmap=colours, norm=norm, linewidths=0, rasterized=True,
-        zorder=2,
+        offset_transform=axis.transData, array=values[order], linewidths=0, **style,
     )  # fmt: skip
     axis.add_collection(discs)
     return discs

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import matplotlib
@@ -12,7 +13,7 @@ from matplotlib.patches import Annulus
 from coupling.datasets.geometry import gate_of, gate_tunnel, on_tunnel
 from coupling.figures.picture import GATE, INITIAL, NOW, STYLE, Picture
 from coupling.figures.polar import around_zero, at_time, closed_curve, crown_up, legend_below, radial_ticks
-from coupling.figures.tunnel import mark_gate
+from coupling.figures.tunnel import joints_of, mark_gate, mark_joints
 from coupling.postprocess.extremes import extremes
 from structure.response import FORCES, SHOWN
 
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-def pressures_polar(pressures: xr.Dataset, time: int = -1, tunnel: int | None = None) -> Picture:
+def pressures_polar(
+    pressures: xr.Dataset, time: int = -1, tunnel: int | None = None, joints: Sequence[float] = ()
+) -> Picture:
     """Soil and water pressure on the lining, initial against now.
 
     Parameters
@@ -32,6 +35,8 @@ def pressures_polar(pressures: xr.Dataset, time: int = -1, tunnel: int | None = 
         Index of the record called "now".
     tunnel : int, optional
         Which one, when there are several; that of the gate when left out.
+    joints : sequence of float
+        Angles of the ring's joints [degree], marked.
     """
     pressures = on_tunnel(pressures, tunnel)
     angle = np.radians(pressures["theta"].values)
@@ -49,6 +54,7 @@ def pressures_polar(pressures: xr.Dataset, time: int = -1, tunnel: int | None = 
             radial_ticks(axis, gate_of(pressures))
             if tunnel in (None, gate_tunnel(pressures)):
                 mark_gate(axis, pressures)
+            mark_joints(axis, joints)
             axis.set_title(SHOWN[name].label, pad=12)
         legend_below(figure, axes[0])
     return figure
@@ -79,6 +85,7 @@ def internal_forces(response: xr.Dataset, time: int = -1) -> Picture:
             axis.plot(*closed_curve(angle, end), color=NOW, label=at_time(now))
             axis.fill_between(*closed_curve(angle, end), 0.0, color=NOW, alpha=0.12, lw=0)
             around_zero(axis, start, end)
+            mark_joints(axis, joints_of(response))
             told = []
             for kind in ("max", "min"):
                 value, at = scale * found[f"{name}_{kind}"].item(), found[f"{name}_{kind}_angle"].item()
@@ -109,7 +116,7 @@ def deformed_ring(response: xr.Dataset, time: int = -1) -> Picture:
     shapes = [centred(angle, s["displacement_radial"].values, s["displacement_tangential"].values) for s in states]
     largest = max(float(np.hypot(*shape).max()) for shape in shapes)
     factor = _round_down(0.18 * radius / max(largest, 1e-12))
-    joints = np.radians(response["joint_angle"].values) if response.sizes.get("joint") else np.array([])
+    joints = np.radians(joints_of(response))
     with matplotlib.rc_context(STYLE):
         figure = Picture(figsize=(4.6, 4.7), layout="constrained")
         axis = figure.subplots()

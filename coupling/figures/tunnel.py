@@ -27,3 +27,17 @@ def mark_gate(axis, dataset):
     gate = gate_of(dataset)
     if gate is not None:
         axis.plot(np.radians(gate.angle), axis.get_ylim()[1], "v", color=GATE, ms=6, clip_on=False, label="gate")
+
+
+def joints_of(response):
+    """Angles of a response's joints [degree], none without joints."""
+    return response["joint_angle"].values if response.sizes.get("joint") else np.array([])
+
+
+def mark_joints(axis, angles):
+    """Dotted lines with the joints' numbers in a polar diagram whose limits are set."""
+    low, high = axis.get_ylim()
+    for number, angle in enumerate(np.radians(angles), start=1):
+        axis.plot([angle, angle], [low, high], color="0.35", lw=0.7, ls=(0, (1, 2)), zorder=1)
+        place, box = (angle, low + 0.93 * (high - low)), {"fc": "white", "ec": "none", "alpha": 0.7, "pad": 0.3}
+        axis.annotate(str(number), place, ha="center", va="center", fontsize=6, color="0.2", bbox=box)

@@ -6,11 +6,13 @@ import matplotlib
 import numpy as np
 from matplotlib.colors import Normalize
 
-from coupling.figures.picture import GATE, INITIAL, NOW, SECOND, STYLE, Picture
+from coupling.figures.picture import GATE, INITIAL, STYLE, Picture
 from structure.limits import UTILISATIONS
 from structure.response import SHOWN
 
-COLOURS = (NOW, SECOND, "#38761d", "#674ea7", "#b45f06", "#0b7a75", "#a64d79", "#7f6000", "0.45")
+#: Told apart also without colour: five colours of Okabe and Ito, then the same with dashes.
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "0.15")
+DASHES = ("-", (0, (5, 2)), (0, (1, 1.5)))
 RECORDS = 6  # clouds of points drawn in the diagram, the first and the last among them
 
 
@@ -30,7 +32,7 @@ def checks(checked):
         axes = np.atleast_1d(figure.subplots(1, 2 if with_section else 1))
         if with_section:
             _diagram(figure, axes[0], checked)
-        _over_time(axes[-1], checked)
+        _over_time(figure, axes[-1], checked, 3 if with_section else 1)
     return figure
 
 
@@ -74,7 +76,7 @@ def _diagram(figure, axis, checked):
     axis.set_ylabel(f"design {shown['axial_force'].label}, compression positive")
 
 
-def _over_time(axis, checked):
+def _over_time(figure, axis, checked, columns):
     over_mass = "inflow_mass" in checked and checked["inflow_mass"].values[-1] > 0
     along = checked["inflow_mass" if over_mass else "time"].values
     top = 1.0
@@ -82,8 +84,8 @@ def _over_time(axis, checked):
     for k, name in enumerate(names):
         largest = checked[name].max([d for d in checked[name].dims if d != "time"]).values
         largest = np.where(np.isfinite(largest), largest, np.nan)  # what nothing carries has no place on an axis
-        marks, colour = "o-" if len(along) == 1 else "-", COLOURS[k % len(COLOURS)]
-        axis.plot(along, largest, marks, color=colour, label=UTILISATIONS[name])
+        style = {"color": COLOURS[k % len(COLOURS)], "ls": DASHES[k // len(COLOURS) % len(DASHES)]}
+        axis.plot(along, largest, marker="o" if len(along) == 1 else None, label=UTILISATIONS[name], **style)
         top = max(top, np.nanmax(largest, initial=0.0))
     axis.axhline(1.0, color=GATE, lw=1.0, ls=(0, (4, 2)))
     axis.annotate("limit", (0.01, 1.0), xycoords=("axes fraction", "data"), va="bottom", color=GATE, fontsize=7)
@@ -95,4 +97,4 @@ def _over_time(axis, checked):
     axis.grid(True, color="0.88")
     axis.spines[["top", "right"]].set_visible(False)
     axis.tick_params(colors=INITIAL, labelcolor="0.1")
-    axis.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=1 if len(names) < 3 else 2, fontsize=7)
+    figure.legend(loc="outside lower center", ncols=min(len(names), columns), fontsize=7)

@@ -12,7 +12,11 @@ from coupling.files.checkpoint import remove_checkpoints
 from coupling.refused import Refused
 
 RUN_FILE, MESH_FILE, SCENE_FILE, LOG_FILE, FIGURES = "run.nc", "mesh.vtu", "scene.toml", "run.log", "figures"
-REPORT_FILE, FIELDS = "report.html", "fields"
+REPORT_FILE, REPORT_PDF, FIELDS, TABLES = "report.html", "report.pdf", "fields", "tables"
+#: Files in the folders of a run that are its own.
+OWN_KINDS = {
+    FIGURES: (".png", ".svg", ".pdf"), FIELDS: (".vtu", ".pvd", ".xdmf", ".h5", ".gif"), TABLES: (".csv", ".xlsx"),
+}  # fmt: skip
 LOCK_FILE = ".lock"
 SECONDS_FOR_A_LOOK = 0.1  # a look at the lock may hold it for an instant
 
@@ -57,15 +61,14 @@ def claimed(folder, overwrite=False):
                 f"output folder '{folder}': not empty, it holds {shown}; choose another --out, "
                 "ask for --overwrite (overwrite=True) to replace the run in it, or for --resume to continue it"
             )
-        for name in (RUN_FILE, MESH_FILE, SCENE_FILE, LOG_FILE, REPORT_FILE):
+        for name in (RUN_FILE, MESH_FILE, SCENE_FILE, LOG_FILE, REPORT_FILE, REPORT_PDF):
             (folder / name).unlink(missing_ok=True)
             (folder / f"{name}.journal").unlink(missing_ok=True)
         remove_checkpoints(folder)
-        for picture in (folder / FIGURES).glob("*.png"):
-            picture.unlink()
-        for fields in (folder / FIELDS).glob("*"):
-            if fields.suffix in (".vtu", ".pvd", ".xdmf", ".h5", ".gif"):
-                fields.unlink()
+        for name, kinds in OWN_KINDS.items():
+            for file in (folder / name).glob("*"):
+                if file.suffix in kinds:
+                    file.unlink()
         yield folder
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from coupling.postprocess.elements import cell_means
 
@@ -58,6 +59,11 @@ def surface_settlement(points: xr.Dataset, spacing: float = 1.0, depth: float = 
     )
 
 
+def gauss(x: NDArray[np.float64], peak: float, centre: float, width: float) -> NDArray[np.float64]:
+    """Settlement of the trough at x, in the unit of its peak. Source: Peck (1969)."""
+    return peak * np.exp(-((x - centre) ** 2) / (2 * width**2))
+
+
 def trough(settlement: xr.DataArray) -> xr.Dataset:
     """Gauss curve s = s_max exp(-(x - x_0)^2/(2 i^2)) closest to the settlement of every time.
 
@@ -69,16 +75,13 @@ def trough(settlement: xr.DataArray) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        Over time: largest, that of the settlement itself [m]; centre, width i [m], r_squared [-] of the curve, NaN
-        where the surface has not settled by a hundredth of a millimetre or no curve is found; volume [m2], the area of
-        the trough.
+        Over time: largest, that of the settlement itself [m]; peak s_max, centre, width i [m], r_squared [-] of the
+        curve and error, the root mean square of what it leaves [m], NaN where the surface has not settled by a
+        hundredth of a millimetre or no curve is found; volume [m2], the area of the trough.
 
     Source of the curve: Peck (1969).
     """
     from scipy.optimize import curve_fit
-
-    def gauss(x, largest, centre, width):
-        return largest * np.exp(-((x - centre) ** 2) / (2 * width**2))
 
     x = settlement["x"].values
     rows = []
@@ -86,7 +89,7 @@ def trough(settlement: xr.DataArray) -> xr.Dataset:
         known = np.isfinite(values)
         here, down = x[known], values[known]
         largest, volume = float(down.max()), float(np.trapezoid(down, here))
-        row = [largest, np.nan, np.nan, np.nan, volume]
+        row = [largest, *[np.nan] * 5, volume]
         if largest > 1e-5:
             start = (largest, float(here[down.argmax()]), 0.2 * (here[-1] - here[0]))
             limits = ((0.0, here[0], 0.5), (10 * largest, here[-1], 2 * (here[-1] - here[0])))
@@ -96,13 +99,16 @@ def trough(settlement: xr.DataArray) -> xr.Dataset:
                 found = None
             if found is not None:
                 left = down - gauss(here, *found)
-                row[1:4] = found[1], found[2], 1 - float(left @ left / np.sum((down - down.mean()) ** 2))
+                spread = np.sum((down - down.mean()) ** 2)
+                row[1:6] = *found, 1 - float(left @ left / spread), float(np.sqrt(np.mean(left**2)))
         rows.append(row)
     names = (
         ("largest", "m", "largest settlement"),
+        ("peak", "m", "largest settlement of the Gauss curve"),
         ("centre", "m", "middle of the trough"),
         ("width", "m", "distance i from the middle of the trough to its inflection"),
         ("r_squared", "1", "coefficient of determination of the Gauss curve"),
+        ("error", "m", "root mean square of what the Gauss curve leaves"),
         ("volume", "m^2", "area of the trough"),
     )
     columns = np.array(rows).T

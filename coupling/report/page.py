@@ -22,7 +22,9 @@ MARK = '<meta name="generator" content="gushing report">'
 SCRIPTS = ("data.js", "charts.js", "ground.js", "tables.js", "player.js")
 
 
-def write_report(path: str | Path, out: str | Path | None = None, model: str | None = None) -> Path:
+def write_report(
+    path: str | Path, out: str | Path | None = None, model: str | None = None, ladder: str | Path | None = None
+) -> Path:
     """Write the page about a run or a study.
 
     Parameters
@@ -35,6 +37,8 @@ def write_report(path: str | Path, out: str | Path | None = None, model: str | N
         report is replaced, nothing else.
     model : str, optional
         Lining model whose numbers lead; left out: the run's own, or the first of the study.
+    ladder : str or path, optional
+        Of a run: the mesh ladder of its scene (`gush accuracy --scene`), from which forces get the error of the mesh.
 
     Returns
     -------
@@ -45,7 +49,8 @@ def write_report(path: str | Path, out: str | Path | None = None, model: str | N
     RunFileError
         No run, or one without a record.
     Refused
-        Neither a run nor a study; `out` exists and is no report, or its folder does not exist; no such model.
+        Neither a run nor a study; `out` exists and is no report, or its folder does not exist; no such model; `ladder`
+        of a study, or of another scene.
     coupling.studies.design.StudyError
         A study whose definition cannot be read.
     """
@@ -54,10 +59,12 @@ def write_report(path: str | Path, out: str | Path | None = None, model: str | N
         from coupling.report import run_page
 
         target = _checked_path(run_file(path).parent, out)
-        shown = run_page.collect(path, model)
+        shown = run_page.collect(path, model, ladder)
     else:
         from coupling.report import study_page
 
+        if ladder is not None:
+            raise Refused(f"--ladder: is of one run, '{path}' is a study; leave --ladder out")
         target = _checked_path(folder, out)
         shown = study_page.collect(folder, target.parent, model)
     replace_file(target, rendered(shown))
@@ -89,7 +96,7 @@ def rendered(shown: dict[str, Any]) -> str:
     shown : dict from :func:`coupling.report.run_page.collect` or :func:`coupling.report.study_page.collect`.
     """
     import jinja2
-    from markupsafe import Markup
+    from markupsafe import Markup, escape
 
     from coupling.report.charts import COLUMNS, JOINT_COLUMNS, charts_of
     from coupling.report.numbers import shown as as_read
@@ -100,6 +107,12 @@ def rendered(shown: dict[str, Any]) -> str:
     def worded(value):
         number = isinstance(value, int | float) and not isinstance(value, bool)
         return as_read(value) if number or value is None else value_text(value)
+
+    def coded(text):  # commands stand between backticks
+        parts = [escape(part) for part in text.split("`")]
+        return Markup("").join(
+            Markup("<code>{}</code>").format(part) if k % 2 else part for k, part in enumerate(parts)
+        )
 
     def source(name):
         return Markup((resources.files("coupling.report") / "templates" / name).read_text(encoding="utf-8"))
@@ -115,7 +128,7 @@ def rendered(shown: dict[str, Any]) -> str:
         loader=jinja2.PackageLoader("coupling.report"), autoescape=True, trim_blocks=True, lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )  # fmt: skip
-    environment.filters |= {"shown": as_read, "shown_error": shown_error, "worded": worded}
+    environment.filters |= {"shown": as_read, "shown_error": shown_error, "worded": worded, "coded": coded}
     return environment.get_template("page.html").render(
         **shown, mark=Markup(MARK), source=source, scripts=SCRIPTS, charts=charts, packed=packed(player),
         models=[model["name"] for model in max(answers, key=len, default=[])],

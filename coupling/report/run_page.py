@@ -6,8 +6,10 @@ from coupling.datasets import RunFileError, identifier, opened, read_run, struct
 from coupling.datasets.geometry import gate_of, gate_tunnel, tunnels_beside
 from coupling.datasets.tree import model_names
 from coupling.postprocess.limits import HEADS, limit_rows
+from coupling.postprocess.mesh_ladder import read_ladder
 from coupling.postprocess.summary import summarise_run
 from coupling.refused import Refused, SceneError
+from coupling.report.answer import answer_of_run
 from coupling.report.curves import MOST_IN_DETAIL, MOST_STOPS, budget, entry, ring_series, run_states
 from coupling.report.ground import field_snapshots, mesh_picture, section
 from coupling.report.numbers import inflow_numbers, pressure_numbers, ring_numbers, shown
@@ -22,7 +24,7 @@ MOST_RECORDS = 600
 VERDICTS = {True: "as expected", False: "look at this", None: "–", "poor": "poor: look at this"}
 
 
-def collect(run, model=None):
+def collect(run, model=None, ladder=None):
     """Everything that the page shows, names as `page.html` uses them.
 
     Parameters
@@ -30,6 +32,8 @@ def collect(run, model=None):
     run : str or path
     model : str, optional
         Lining model whose numbers lead; left out: that of the run itself, see :func:`structure.models.in_order`.
+    ladder : path, optional
+        Mesh ladder of the scene, see :func:`coupling.postprocess.mesh_ladder.read_ladder`.
     """
     with opened(run) as file:
         tree = _led_by(read_run(file), model)
@@ -40,6 +44,7 @@ def collect(run, model=None):
         summary = summarise_run(file)
     attributes = {name: _plain(value) for name, value in tree.attrs.items()}
     scene = read_scene(attributes)
+    meshes = None if ladder is None else read_ladder(ladder, attributes.get("scene_name", ""))
     rows = quality(tree, summary, scene)
     fields = field_snapshots(tree["points"].to_dataset()) if "points" in tree.children else None
     kept = evenly(tree["history"].sizes["time"], MOST_RECORDS)
@@ -52,6 +57,7 @@ def collect(run, model=None):
         "lead": f"{shown(summary['inflow_mass'])} kg of grains per metre in {shown(summary['time'])} s"
                 f"{'' if wall is None else f', computed in {duration(wall)}'}.",
         "status": (summary["status"], summary["status"]),
+        "answer": answer_of_run(tree, meshes),
         "warnings": run_warnings(tree, attributes, rows),
         "notes": _thinned(len(kept), records, step, fields, scene, tree["history"].sizes["time"]),
         "attributes": attributes,

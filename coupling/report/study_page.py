@@ -6,6 +6,7 @@ from pathlib import Path
 from coupling.datasets import RunFileError, read_attributes
 from coupling.datasets.group import read_group_at_once
 from coupling.files.folder import LOG_FILE, REPORT_FILE, RUN_FILE
+from coupling.postprocess.extremes import RING_EXTREMES
 from coupling.postprocess.quality import ERRORS
 from coupling.refused import Refused
 from coupling.report.charts import COLUMNS
@@ -13,13 +14,15 @@ from coupling.report.curves import MOST_IN_DETAIL, budget, entry, ring_series, r
 from coupling.report.numbers import Number, finite, ring_numbers, shown
 from coupling.report.packing import evenly
 from coupling.report.trust import balances, case_warnings, last_record
+from coupling.responses.comparison import HEADS as DIFFERENCES
+from coupling.responses.comparison import difference_cells
 from coupling.runs.progress_line import duration
 from coupling.scenes.features import facts
 from coupling.studies.case import RUN_FOLDER
 from coupling.studies.collect import stored_cases, unreadable
 from coupling.studies.design import Range, StudyError, short_names, value_text
 from coupling.studies.execute import case_file
-from coupling.studies.limits import HEADS, limit_rows, limits_of_case, limits_of_study
+from coupling.studies.limits import HEADS, governing_of_study, limit_rows, limits_of_case, limits_of_study
 from structure.lining import at_whole_degrees
 from structure.models import model_name
 
@@ -61,6 +64,7 @@ def collect(folder, beside, model=None):
     chosen = [drawn[k] for k in evenly(len(drawn), MOST_CASES)] if drawn else []
     player, notes = _player(whole, answers, chosen, plan.records)
     attributes = next(iter(whole.values())).attrs if whole else {}
+    limits = _found_limits(done, whole, models[0] if models else None)
     if len(chosen) < len(drawn):
         notes.insert(0, f"Charts hold {len(chosen)} of {len(drawn)} finished cases, evenly chosen; tables hold all.")
     return {
@@ -71,6 +75,7 @@ def collect(folder, beside, model=None):
                    f"{len(done)} of {len(rows)} finished"),
         "warnings": _warnings(rows, lost),
         "notes": notes,
+        "answer": _answer(done, limits),
         "attributes": attributes,
         "made": f"first case of {attributes['created']}" if "created" in attributes else "",
         "design_title": "Design of the study",
@@ -79,7 +84,7 @@ def collect(folder, beside, model=None):
         "lost": lost,
         "done": done,
         "table": _table(done),
-        "limits": _limits(done, whole, models[0] if models else None),
+        "limits": _limits(done, limits, models[0] if models else None),
         "trust": _trust(done),
         "player": player,
     }  # fmt: skip
@@ -104,12 +109,15 @@ def collect_runs(compared, beside):
     player, notes = _player(whole, answers, chosen, records)
     design = [(case.parameters["run"], str(file)) for case, file in zip(compared.cases, compared.files, strict=True)]
     last = shown(float(whole[0]["inflow_mass"][-1]))
+    model = str(whole[0]["model"].values[0]) if "model" in whole[0].dims else None
+    limits = _found_limits(done, whole, model)
     return {
         "title": f"Gushing into a tunnel: {len(done)} runs side by side",
         "lead": f"Compared at equal inflow mass, to {last} kg/m, which all of them reached.",
         "status": ("finished", f"{len(done)} runs"),
         "warnings": _warnings(done, []),
         "notes": notes,
+        "answer": _answer(done, limits, compared.rows),
         "attributes": whole[0].attrs,
         "made": f"first run of {whole[0].attrs.get('created', 'unknown time')}",
         "design_title": "What is compared",
@@ -118,7 +126,7 @@ def collect_runs(compared, beside):
         "lost": [],
         "done": done,
         "table": _table(done),
-        "limits": _limits(done, whole, str(whole[0]["model"].values[0]) if "model" in whole[0].dims else None),
+        "limits": _limits(done, limits, model),
         "trust": _trust(done),
         "player": player,
     }
@@ -232,9 +240,37 @@ def _table(done):
     return {"heads": [*heads, ("processor time", "s"), ("wall time", "s"), ("warnings", "")], "rows": rows}
 
 
-def _limits(done, whole, model):
+def _answer(done, limits, differences=()):
+    """What the page begins with: the governing check of all cases, and between what their key numbers lie."""
+    names = {row["number"]: row["label"] for row in done}
+    facts = [("Governing check", governing_of_study(limits, names))]
+    heads, span = ("quantity", "smallest", "case", "largest", "case"), [] if differences else _span(done)
+    tables = [("Smallest and largest of the cases", heads, span)]
+    runs = list(dict.fromkeys(row["run"] for row in differences))
+    for run in runs:
+        cells = [difference_cells(row) for row in differences if row["run"] == run]
+        tables.append((f"{run} less {done[0]['parameters']['run']}: largest differences", DIFFERENCES, cells))
+    return {"rings": [], "facts": facts, "tables": [table for table in tables if table[2]]}
+
+
+def _span(done):
+    """Rows of the smallest and the largest of every key number, with their cases."""
+    rows = []
+    for key in ("inflow_mass", "time", "flow_zone_area", *RING_EXTREMES):
+        found = [(number.final * number.scale, row["label"], number) for row in done for number in row["numbers"]
+                 if number.key == key and number.final is not None]  # fmt: skip
+        if len(found) > 1:
+            (least, of_least, number), (most, of_most, _) = (pick(found, key=lambda one: one[0]) for pick in (min, max))
+            rows.append((f"{number.label} [{number.unit}]", shown(least), of_least, shown(most), of_most))
+    return rows
+
+
+def _found_limits(done, whole, model):
+    return limits_of_study({row["number"]: limits_of_case(whole[row["number"]], model) for row in done})
+
+
+def _limits(done, found, model):
     """The worst case and the share of cases beyond every limit as a table; no rows without limits."""
-    found = limits_of_study({row["number"]: limits_of_case(whole[row["number"]], model) for row in done})
     rows = limit_rows(found, {row["number"]: row["label"] for row in done})
     beyond = [one["beyond"] > 0 for one in found.values()]
     about = f"Utilisations of {model} over all records of a case, 1 is the limit."

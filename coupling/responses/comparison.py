@@ -167,3 +167,20 @@ def largest_difference(
         "inflow_mass": float(reference["inflow_mass"][record]) if "inflow_mass" in reference else None,
         "cause": cause,
     }
+
+
+#: Over the cells of :func:`difference_cells`.
+HEADS = ("quantity", "largest difference", "of the extreme", "where", "when")
+
+
+def difference_cells(row: dict[str, Any]) -> tuple[str, ...]:
+    """A row of :class:`Comparison` as people read it, under `HEADS`."""
+    angle = "-" if row["theta"] is None else f"{row['theta']:.4g}°"
+    mass = "" if row["inflow_mass"] is None else f", {row['inflow_mass']:.4g} kg/m"
+    return (
+        row["label"],
+        f"{row['difference'] * row['scale']:+.3g} {row['unit']}",
+        f"{100 * row['relative']:.2f} %",
+        angle if row["joint"] is None else f"joint {row['joint']}",
+        f"{row['time']:.3g} s{mass}",
+    )

@@ -81,3 +81,13 @@ def limit_rows(found: dict[str, dict[str, Any]], names: dict[int, str]) -> list[
         first = "never" if mass is None else f"{mass:.4g} kg/m"
         rows.append((UTILISATIONS[name], names[one["worst_case"]], utilisation_text(one["largest"]), beyond, first))
     return rows
+
+
+def governing_of_study(found: dict[str, dict[str, Any]], names: dict[int, str]) -> str:
+    """The check with the worst case of all, in a sentence; arguments as of :func:`limit_rows`."""
+    if not found:
+        return "No limits are stated, so nothing says whether the rings bear this: give the scene a table [limits]."
+    name = max(found, key=lambda one: found[one]["largest"])
+    what, case, largest, beyond, first = limit_rows({name: found[name]}, names)[0]
+    told = f"utilisation {largest} in {case}; cases beyond 1: {beyond}, first passed at {first}"
+    return f"{what[:1].upper()}{what[1:]}: {told}."

@@ -1,10 +1,12 @@
 """Exported fields, read back with meshio, hold the datasets' numbers; `gush info` knows what a file is."""
 
 import json
+import sys
 import xml.etree.ElementTree as ET
 
 import meshio
 import numpy as np
+import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
@@ -162,6 +164,44 @@ def test_xdmf_series_hold_points_and_mesh_of_every_time(folder, tmp_path):
             ET.ElementTree(alone).write(tmp_path / "alone.xdmf")
             same(meshio.read(tmp_path / "alone.xdmf"), data.isel(time=k))
         (tmp_path / "alone.xdmf").unlink()
+
+
+def test_tables_hold_the_datasets_with_units_in_their_headings(folder, tmp_path, monkeypatch):
+    files = {path.stem: pd.read_csv(path) for path in export(folder, "csv", tmp_path)}
+    history, response = datasets.read_history(folder), datasets.read_response(folder)
+    np.testing.assert_array_equal(files["history"]["time [s]"], TIMES)
+    np.testing.assert_allclose(files["history"]["inflow_mass [kg/m]"], history["inflow_mass"])
+    forces = files["forces_beam_spring"].set_index(["time [s]", "theta [degree]"])["bending_moment [N m/m]"]
+    for time in (TIMES[0], TIMES[-1]):
+        np.testing.assert_allclose(forces.loc[time], response["bending_moment"].sel(time=time))
+    largest = files["ring_beam_spring"]["bending_moment_max [N m/m]"]
+    np.testing.assert_allclose(largest, response["bending_moment"].max("theta"))
+    joints = files["joints_beam_spring"]
+    assert len(joints) == response.sizes["time"] * response.sizes["joint"]
+    np.testing.assert_allclose(joints["joint_opening [m]"], response["joint_opening"].values.ravel())
+    told = files["answer"].set_index(["quantity", "of it"]).loc[("axial_force", "max")]
+    assert told["value"] == pytest.approx(float(response["axial_force"].max())) and told["unit"] == "N/m"
+    assert "limits" not in files and "pressures" in files
+    (tmp_path / "notes.csv").write_text("mine")
+    refused = gush("export", folder, "--format", "csv", "--out", tmp_path)
+    assert refused.exit_code == 2 and "notes.csv" in refused.output
+    monkeypatch.setitem(sys.modules, "openpyxl", None)
+    refused = gush("export", folder, "--format", "xlsx", "--out", tmp_path / "excel")
+    assert refused.exit_code == 2 and "needs openpyxl" in refused.output.replace("\n", " ")
+
+
+def test_excel_file_has_the_tables_as_sheets(folder, tmp_path):
+    pytest.importorskip("openpyxl", reason="the extra 'excel'")
+    (file,) = export(folder, "xlsx", tmp_path)
+    sheets = pd.read_excel(file, sheet_name=None)
+    assert {"answer", "history", "pressures", "forces_beam_spring"} <= sheets.keys()
+    np.testing.assert_array_equal(sheets["history"]["time [s]"], TIMES)
+
+
+def test_pictures_are_exported_as_vectors(folder, tmp_path):
+    files = export(folder, "svg", tmp_path)
+    assert {"pressures.svg", "internal_forces.svg", "inflow.svg"} <= {path.name for path in files}
+    assert all(ET.parse(path).getroot().tag.endswith("svg") for path in files)
 
 
 def test_mesh_that_does_not_change_is_written_once(folder, tmp_path):

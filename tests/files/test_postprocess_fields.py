@@ -74,6 +74,7 @@ def test_trough_finds_the_gauss_curve_that_was_put_in():
     # 1 %: cells of a metre average a curve of 6 m width
     assert float(trough["width"][1]) == pytest.approx(6.0, rel=0.01)
     assert float(trough["centre"][1]) == pytest.approx(2.0, abs=0.05)
+    assert float(trough["peak"][1]) == pytest.approx(0.04, rel=0.01) and float(trough["error"][1]) < 1e-4
     assert float(trough["volume"][1]) == pytest.approx(0.04 * 6.0 * np.sqrt(2 * np.pi), rel=0.01)
     # 68.3 % of a Gauss curve lies within one width
     assert float(postprocess.share_within(settlement, 6.0, centre=2.0)[1]) == pytest.approx(0.683, abs=0.02)

@@ -6,8 +6,10 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from coupling import datasets, figures
+import structure
+from coupling import datasets, figures, postprocess
 from coupling.files.provenance import root_attributes
 from coupling.measurements import misfit
 from coupling.responses.respond import respond
@@ -113,6 +115,65 @@ def test_fields_show_every_point_in_view_and_name_their_units(run):
     np.testing.assert_allclose(pore, np.sort(expected[np.isfinite(expected)]) / 1e3)
     top = 1e3 * np.nanmax(np.abs(points["displacement_x"]))
     assert panels["displacement [mm]"].get_array().max() == pytest.approx(float(top))
+
+
+def test_full_elements_show_the_mean_of_their_points_and_others_the_points():
+    # two triangles of a square: four points fill the lower one, one point lies in the upper one
+    x, y = np.array([0.2, 0.6, 0.8, 0.5, 0.2]), np.array([0.1, 0.1, 0.5, 0.3, 0.9])
+    pore = np.array([1e3, 2e3, 3e3, 6e3, 9e3])
+    points = xr.Dataset({name: ("point", values) for name, values in {
+        "x": x, "y": y, "pore_pressure": pore, "volume": np.full(5, 0.125), "stress_yy": -pore,
+        "displacement_x": 0 * x, "displacement_y": 0 * x, "deviatoric_strain": 0 * x}.items()},
+        {"time": 1.0}, {"tunnel_x": [0.5], "tunnel_axis_depth": [-0.5], "tunnel_outer_radius": [0.3],
+                        "tunnel_inner_radius": [0.2]})  # fmt: skip
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    mesh = xr.Dataset({"x": ("node", square[:, 0]), "y": ("node", square[:, 1]),
+                       "element_nodes": (("element", "corner"), [[0, 1, 2], [0, 2, 3]])})  # fmt: skip
+    figure = figures.fields_around_tunnel(points, mesh=mesh)
+    elements, discs = figure.axes[2].collections
+    assert figure.axes[2].get_title() == "pore pressure [kPa]"
+    np.testing.assert_allclose(elements.get_array(), [3.0])
+    np.testing.assert_allclose(discs.get_array(), [9.0])
+    # an element among full ones that no point happens to lie in takes the mean of its nodes
+    moved = points.assign(x=("point", [0.5, 0.45, 0.8, 0.9, 0.2]), y=("point", [0.3, 0.35, 0.5, 0.5, 0.9]))
+    thirds = np.vstack([square[:3], [[2 / 3, 1 / 3]]])
+    mesh = xr.Dataset({"x": ("node", thirds[:, 0]), "y": ("node", thirds[:, 1]),
+                       "element_nodes": (("element", "corner"), [[0, 1, 3], [1, 2, 3], [2, 0, 3]])})  # fmt: skip
+    elements = figures.fields_around_tunnel(moved, mesh=mesh).axes[2].collections[0]
+    np.testing.assert_allclose(elements.get_array(), [3.0, 4.5, 1.5])
+    # what has not moved is drawn at the lower end of a logarithmic scale, not left white
+    assert figure.axes[0].collections[0].get_array().min() == 1.0
+
+
+def test_trough_is_drawn_with_its_gauss_curve_and_volume_loss():
+    x = np.arange(-30.0, 31.0)
+    settlement = xr.DataArray([0.04 * np.exp(-(x**2) / (2 * 8.0**2))], {"time": [3.0], "x": x}, ("time", "x"))
+    found = postprocess.trough(settlement).assign(volume_loss=("time", [0.02]), width_over_depth=("time", [0.4]))
+    axis = figures.settlement_trough(settlement, found).axes[0]
+    np.testing.assert_allclose(line(axis, "points of the surface").get_ydata(), 1e3 * settlement[0])
+    curve = line(axis, "Gauss curve (Peck 1969)")
+    np.testing.assert_allclose(curve.get_ydata(), 40 * np.exp(-(curve.get_xdata() ** 2) / 128), atol=1e-3)
+    assert "volume loss 2 %" in axis.get_title() and axis.yaxis_inverted()
+
+
+def test_forces_of_two_models_are_drawn_with_their_difference(run):
+    response = datasets.read_response(run)
+    other = response.assign(bending_moment=response["bending_moment"] + 2e3)
+    drawn = figures.forces_compared({"beam-spring": response, "continuum": other})
+    (axis,) = [axis for axis in drawn.axes if axis.get_title().startswith("M of continuum")]
+    np.testing.assert_allclose(axis.lines[0].get_ydata(), 2.0)
+
+
+def test_legend_of_many_checks_stays_within_the_figure(run):
+    own = {name: 1e9 for name in ("axial_force", "shear_force", "bending_moment", "convergence_vertical")}
+    limits = structure.Limits(gasket_opening=1e-3, gasket_offset=0.1, joint_dislocation=0.01, own=own)
+    drawn = figures.checks(structure.check(datasets.read_response(run), limits))
+    canvas = FigureCanvasAgg(drawn)
+    canvas.draw()
+    inside = drawn.bbox
+    for text in drawn.legends[0].get_texts():
+        box = text.get_window_extent()
+        assert inside.x0 + 2 <= box.x0 and box.x1 <= inside.x1 - 2
 
 
 def test_mesh_is_drawn_around_the_tunnel_and_around_the_gate(run):

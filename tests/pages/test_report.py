@@ -3,6 +3,7 @@
 import base64
 import hashlib
 import json
+import shutil
 import zlib
 from importlib import resources
 
@@ -12,10 +13,16 @@ import xarray as xr
 from typer.testing import CliRunner
 
 import coupling
+import structure
 from coupling import datasets
 from coupling.cli import app
+from coupling.datasets.geometry import Gate, Tunnel
+from coupling.postprocess import mesh_ladder
+from coupling.postprocess.answer import Extreme, answers
+from coupling.refused import Refused
 from coupling.report import curves, ground, numbers, page, run_page, trust
 from coupling.report.packing import evenly, levels, packed
+from coupling.report.ring_drawing import ring_drawing
 from structure.response import FORCES
 from verification.synthetic_run import TIMES, points, write_run
 
@@ -111,6 +118,75 @@ def test_the_library_is_the_one_that_its_makers_published():
     for name, text in (("LICENSE-echarts", "Apache License"), ("NOTICE-echarts", "Apache ECharts"),
                        ("LICENSE-d3", "Bostock")):  # fmt: skip
         assert text in (folder / name).read_text()
+
+
+# -- the answer --------------------------------------------------------------------------------------
+
+
+def test_largest_forces_are_those_of_all_records_with_the_other_model_beside(tree):
+    found = answers(tree)[None]
+    assert (found.model, found.others, found.governing) == ("beam-spring", ["continuum"], None)
+    for extreme in found.forces:
+        values, other = (tree[f"structure/{name}"][extreme.name] for name in ("beam_spring", "continuum"))
+        pick = {"max": lambda v: v.max(), "min": lambda v: v.min(), "size": lambda v: abs(v).max()}[extreme.kind]
+        shown = abs(extreme.value) if extreme.kind == "size" else extreme.value
+        assert shown == float(pick(values)), extreme.name
+        there = {key: place for key, place in extreme.at.items() if key != "inflow_mass"}
+        assert float(values.sel(there)) == extreme.value
+        if extreme.kind != "size":
+            assert extreme.apart == pytest.approx(float(pick(other) - pick(values)), abs=1e-12)
+    assert {"axial_force", "shear_force", "bending_moment", "joint_opening"} <= {one.name for one in found.forces}
+
+
+def test_governing_check_is_the_largest_utilisation_and_the_page_begins_with_it(run, tmp_path):
+    limits = structure.Limits(joint_dislocation=1e-6, own={"bending_moment": 1e9})
+    checked = structure.check(datasets.read_response(run), limits)
+    datasets.write_response(copied := shutil.copy(run, tmp_path), checked)
+    shown = run_page.collect(copied)["answer"]["rings"][0]
+    worst = float(checked["joint_dislocation_utilisation"].max())
+    assert shown["bad"] is True and shown["governing"].startswith(f"Joint dislocation: utilisation {worst:.2f} at ")
+    assert "passes 1 at 0 s" in shown["governing"]
+    html = page.rendered(run_page.collect(copied))
+    assert html.index("Governing check") < html.index('id="numbers"') and html.index("The answer") < html.index(
+        "Warnings"
+    )
+
+
+def test_mesh_error_is_the_distance_from_size_zero_and_its_bar(run, tree, tmp_path):
+    ladder = xr.Dataset(
+        {"value": (("mesh", "inflow_mass", "quantity"), [[[90.0], [95.0]], [[80.0], [85.0]]]),
+         "extrapolated": (("inflow_mass", "quantity"), [[70.0], [92.0]]),
+         "error_bar": (("inflow_mass", "quantity"), [[1.0], [2.0]])},
+        {"factor": ("mesh", [2.0, 1.0]), "inflow_mass": [0.0, 300.0], "quantity": ["M max [kN m/m]"]},
+        {"title": "mesh ladder of quick"},
+    )  # fmt: skip
+    ladder.to_netcdf(tmp_path / "quick-ladder.nc", engine="h5netcdf")
+    read = mesh_ladder.read_ladder(tmp_path / "quick-ladder.nc", "quick")
+    at = lambda mass, name="bending_moment": Extreme(name, "max", 1e5, {"time": 1.0, "inflow_mass": mass}, None)  # noqa: E731
+    # the scene's own mesh is 80 and 85 kN m/m
+    assert mesh_ladder.mesh_error(read, at(10.0)) == pytest.approx(1e3 * (abs(80 - 70) + 1))
+    assert mesh_ladder.mesh_error(read, at(290.0)) == pytest.approx(1e3 * (abs(85 - 92) + 2))
+    assert mesh_ladder.mesh_error(read, at(10.0, "axial_force")) is None
+    rows = {
+        row["name"]: row["mesh"]
+        for row in run_page.collect(run, ladder=tmp_path / "quick-ladder.nc")["answer"]["rings"][0]["rows"]
+    }
+    assert rows["bending moment M, largest"].startswith("± ") and rows["axial force N, largest"] is None
+    for path, told in ((tmp_path / "none.nc", "no such file"), (run, "must be that of scene")):
+        with pytest.raises(Refused, match=told):
+            mesh_ladder.read_ladder(path, "quick")
+
+
+def test_ring_is_drawn_from_joint_to_joint_with_its_key():
+    tunnel = Tunnel(0.0, -20.0, 4.0, 3.6)
+    made = ring_drawing(tunnel, [10.0, 100.0, 190.0, 350.0], Gate(0, 90.0, 0.4))
+    assert [one["key"] for one in made["segments"]] == [False, False, False, True]  # 20 degrees from 350 to 10
+    assert made["segments"][2]["path"].count("0 0 1") == 1  # 160 degrees: the small arc
+    assert made["joints"][1]["ends"][0] == pytest.approx((98.48, 17.36)) and made["joints"][1]["number"] == 2
+    assert made["gate"]["half"] == pytest.approx(5.0) and made["gate"]["inner"] == pytest.approx(90.0)
+    whole = ring_drawing(tunnel, [], None)
+    assert len(whole["segments"]) == 2 and not whole["joints"] and whole["gate"] is None
+    assert not any(one["key"] for one in ring_drawing(tunnel, [0.0, 120.0, 240.0], None)["segments"])
 
 
 # -- what is put into the page ----------------------------------------------------------------------

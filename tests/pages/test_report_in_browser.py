@@ -1,5 +1,9 @@
 """The page about a run in a real browser: its numbers are the datasets', one slider moves all, anybody can use it."""
 
+import json
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from browser import find_browser
@@ -14,9 +18,11 @@ from page_in_browser import (
     wider_than_the_screen,
     written_as,
 )  # fmt: skip
+from typer.testing import CliRunner
 
 import coupling
 from coupling import datasets
+from coupling.cli import app
 from coupling.files.provenance import root_attributes
 from coupling.report import page
 from coupling.report.curves import JOINTS
@@ -201,17 +207,51 @@ def test_text_stands_out_from_its_background(opened):
     assert worst[0] >= 4.5 and worst[2] > 200, worst
 
 
-def test_on_paper_controls_are_gone_and_everything_is_unfolded(opened, tmp_path):
+def test_a_link_holds_the_place_of_the_slider(opened):
+    show_frame(opened, 3)
+    opened.evaluate("new Promise(done => setTimeout(done, 500))")
+    assert opened.evaluate("location.hash") == "#time=0.75"
+    opened.evaluate("location.hash = '#time=0.26'")  # the nearest record
+    opened.evaluate("new Promise(done => setTimeout(done, 500))")
+    assert opened.evaluate("document.getElementById('now').innerText") == "0.25 s, 75 kg/m"
+    show_frame(opened, 4)
+
+
+def test_ring_is_drawn_with_its_joints_in_numbers(opened):
+    numbers = opened.evaluate("[...document.querySelectorAll('.drawing .number')].map(e => e.textContent)")
+    assert numbers == ["1", "2", "3", "4", "5", "6"]
+    assert opened.evaluate("document.querySelectorAll('.drawing .key').length") == 1
+    assert len(drawn(opened, "bending_moment", "numbers")[0]) == 6  # draws what is out of sight, too
+    chart = "echarts.getInstanceByDom(document.getElementById('bending_moment'))"
+    marks = f"{chart}.getOption().series.find(s => s.id === 'numbers').data"
+    assert opened.evaluate(f"{marks}.map(p => p.label.formatter)") == numbers
+
+
+def test_on_paper_controls_are_gone_and_four_pages_are_enough(opened, tmp_path):
     opened.send("Emulation.setEmulatedMedia", media="print")
     shown = "getComputedStyle(document.getElementById('{}')).display"
     assert opened.evaluate(shown.format("play")) == "none" != opened.evaluate(shown.format("now"))
     opened.send("Emulation.setEmulatedMedia", media="")
-    opened.evaluate("addEventListener('beforeprint', () => { window.unfolded ="
-                    " [...document.querySelectorAll('details')].every(d => d.open); })")  # fmt: skip
     opened.print_to(tmp_path / "page.pdf")
-    assert (tmp_path / "page.pdf").read_bytes().startswith(b"%PDF")
-    assert opened.evaluate("window.unfolded") is True
-    assert opened.evaluate("[...document.querySelectorAll('details')].some(d => d.open)") is False
+    assert 1 <= pages_of(tmp_path / "page.pdf") <= 4
+
+
+def pages_of(pdf):
+    return len(re.findall(rb"/Type\s*/Page\b", pdf.read_bytes()))
+
+
+def test_report_with_pdf_prints_the_page_and_nothing_of_others(run, tmp_path, monkeypatch):
+    asked = ["report", str(run), "--out", str(tmp_path / "page.html"), "--pdf", "--json", "-"]
+    printed = CliRunner().invoke(app, asked)
+    assert printed.exit_code == 0, printed.output
+    pdf = Path(json.loads(printed.output)["pdf"])
+    assert pdf == tmp_path / "page.pdf" and pages_of(pdf) <= 4
+    pdf.write_bytes(b"%PDF-1.4 of somebody else")
+    refused = CliRunner().invoke(app, asked)
+    assert refused.exit_code == 2 and "is no report" in refused.output
+    monkeypatch.setenv("PATH", "")
+    refused = CliRunner().invoke(app, asked)
+    assert refused.exit_code == 2 and "apt-get install chromium-headless-shell" in refused.output.replace("\n", " ")
 
 
 def test_names_in_a_scene_are_text_and_nothing_else(browser, quick_scene, tmp_path):
@@ -245,4 +285,5 @@ def test_runs_without_ring_or_with_one_record_or_two_tunnels_have_a_page(browser
     browser.evaluate("document.getElementById('all').click()")
     first, second = (drawn(browser, "soil_pressure", f"line{k}")[0] for k in (0, 1))
     np.testing.assert_allclose(np.array(second) / first, 2.0, rtol=1e-3)
+    assert browser.evaluate("document.querySelectorAll('.ring-picture').length") == 2
     assert browser.complaints == []

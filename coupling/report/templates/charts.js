@@ -101,7 +101,8 @@ class RingChart extends Chart {
       tooltip: this.tooltip((p) => `${shown(p.data[1 - this.valueAt])}°`),
       series: [
         line("joints", { color: "#8b949e", width: 1, type: [1, 3] }, joints, system),
-        line("zero", { color: GREY, width: 1 }, zero, system), this.gates(polar, axis), ...this.start,
+        line("zero", { color: GREY, width: 1 }, zero, system), this.numbers(polar, axis, first), this.gates(polar, axis),
+        ...this.start,
         ...this.lines.map((l, k) => line(`line${k}`, l.style, [], { ...system, name: l.name })),
       ],
     }, true);
@@ -122,6 +123,18 @@ class RingChart extends Chart {
     return {
       grid: { left: 54, right: 16, top: 20, bottom: 42 }, dataZoom: [ZOOM], yAxis: { ...AXIS, ...axis },
       xAxis: { ...AXIS, min: 0, max: 360, interval: 60, name: "angle from the crown, clockwise [°]", nameGap: 24 },
+    };
+  }
+  // the numbers of the joints, inside the rim
+  numbers(polar, axis, first) {
+    const marks = (first?.one.joint_angle || []).map((angle, j) => {
+      const turn = angle * Math.PI / 180, offset = polar ? [-9 * Math.sin(turn), 9 * Math.cos(turn)] : [6, 8];
+      return { value: this.at(angle, axis.max), label: { show: true, formatter: String(j + 1), position: "inside", offset } };
+    });
+    return {
+      id: "numbers", type: "scatter", coordinateSystem: polar ? "polar" : "cartesian2d", clip: false, z: 5, silent: true,
+      symbolSize: 1, itemStyle: { color: "transparent" }, tooltip: { show: false }, data: marks,
+      label: { color: INK, fontSize: 10, textBorderColor: "#fff", textBorderWidth: 2 },
     };
   }
   // a triangle at the gate; where cases have different ones, in the colour of the case that is alone there

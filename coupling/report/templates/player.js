@@ -1,7 +1,7 @@
 // One slider for every chart of the page: which entries are shown, how, and at which stop; keys, playing, printing.
 const SECONDS_OF_PLAY = 8, MOST_AT_FIRST = 12, FIRST_OF_MANY = 8;
 const slider = $("slider"), play = $("play");
-let timer = null, unfolded = [];
+let timer = null, noted = null;
 
 // many lines in one frame cannot be told apart: begin with some, spread over the design; of tunnels with that of the gate
 const spread = (j) => Math.round(j * (entries.length - 1) / (FIRST_OF_MANY - 1));
@@ -40,7 +40,16 @@ function show(stop) {
   $("now").textContent = data.stops.told[state.stop];
   slider.setAttribute("aria-valuetext", data.stops.told[state.stop]);
   for (const view of views) view.draw();
+  if (timer === null) note();
 }
+
+// the place of the slider in the address, once it rests: browsers bear few changes of it in a second
+const place = () => Number(new URLSearchParams(location.hash.slice(1)).get(data.stops.along) ?? NaN);
+function note() {
+  clearTimeout(noted);
+  noted = setTimeout(() => window.history.replaceState(null, "", `#${data.stops.along}=${+stops[state.stop].toPrecision(6)}`), 300);
+}
+window.addEventListener("hashchange", () => { if (Number.isFinite(place())) move(nearest(stops, place())); });
 
 function playing(on) {
   clearInterval(timer);
@@ -48,6 +57,7 @@ function playing(on) {
     if (state.stop < stops.length - 1) show(state.stop + 1);
     if (state.stop >= stops.length - 1) playing(false);
   }, Math.min(400, Math.max(40, 1000 * SECONDS_OF_PLAY / stops.length))) : null;
+  if (!on) note();
   play.textContent = on ? "Stop" : "Play";
   play.setAttribute("aria-pressed", String(on));
 }
@@ -95,21 +105,20 @@ function recorded() {
 }
 $("recorded")?.addEventListener("toggle", recorded);
 
-// on paper nothing can be unfolded, and a chart takes the width that it is given
+// on paper a chart takes the width that it is given
 window.addEventListener("beforeprint", () => {
-  unfolded = [...document.querySelectorAll("details:not([open])")];
-  for (const part of unfolded) part.open = true;
-  if ($("recorded")) recorded();
   for (const view of views) if (view.drawn) { view.flush(); view.drawn.getZr().flush(); }
   for (const svg of document.querySelectorAll(".chart svg")) {
     svg.setAttribute("viewBox", `0 0 ${svg.getAttribute("width")} ${svg.getAttribute("height")}`);
   }
 });
 window.addEventListener("afterprint", () => {
-  for (const part of unfolded) part.open = false;
   for (const svg of document.querySelectorAll(".chart svg")) svg.removeAttribute("viewBox");
 });
 
 for (const view of views) view.build();
-show(stops.length - 1);
+if (Number.isFinite(place())) {
+  show(nearest(stops, place()));
+  $("player").scrollIntoView();
+} else show(stops.length - 1);
 document.querySelector("main").setAttribute("aria-busy", "false");
