@@ -80,7 +80,7 @@ def whole_movements(size: int, nodes: np.ndarray, angle: np.ndarray, lever: np.n
 
 
 def uneven_gaps(ring: Ring, parts: RingParts) -> sparse.csr_array:
-    """What joints store in a gap beyond their jumps, (n, n): linear whatever their law; nothing where faces are plane."""
+    """What joints store in a gap beyond their jumps, (n, n): linear under any law; nothing where faces are plane."""
     if parts.linear_joints is None:
         return sparse.csr_array(parts.segments.shape)
     springs = ring.joint_normal_stiffness, ring.joint_shear_stiffness, ring.joint_rotational_stiffness
