@@ -1,6 +1,6 @@
 """Case 3 with a lining that is held, elastic or jointed in the ground, over the whole event: docs/two-way.md.
 
-uv run python -m verification.reports.two_way RUNS    # runs into the folder RUNS, or goes on with them; half an hour
+uv run python -m verification.reports.two_way RUNS    # runs into the folder RUNS, or goes on with them; a quarter of an hour
 """
 
 import sys
@@ -25,7 +25,7 @@ LININGS = {
     "jointed": ({"lining": "jointed"}, "own"),
     "jointed, joints gape and slide": ({"lining": "jointed", "ring": OPEN}, "own"),
 }
-MESHES = {"own": 1.0, "coarse": 2.0}  # times the sizes of case 3
+MESHES = {"finer": 1.4, "coarse": 2.0}  # times the sizes of case 3
 SIZES = ("element_size", "element_size_lining", "element_size_interior", "size_growth")
 MASSES = (0.0, 100.0, 300.0, 1000.0)  # kg/m
 COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7")
@@ -120,10 +120,10 @@ def main(runs):
         for mass in MASSES:
             here = [row for at, row in rows if at == mass]
             lines += [f"**{mass:g} kg/m**", "", *table(tuple(here[0]), (tuple(row.values()) for row in here)), ""]
-        if mesh == "own":
+        if mesh == "finer":
             draw(DOCS / "images" / "two-way.png", found)
     made = made_by("uv run python -m verification.reports.two_way RUNS")
-    page.fill({"made": made, "states": tables["own"], "meshes": tables["coarse"]})
+    page.fill({"made": made, "states": tables["finer"], "meshes": tables["coarse"]})
 
 
 if __name__ == "__main__":
