@@ -6,6 +6,7 @@ import typer
 
 from coupling.commands.compare import compare_command
 from coupling.commands.export import export_command
+from coupling.commands.fit import fit_command
 from coupling.commands.info import info_command
 from coupling.commands.init import init_command
 from coupling.commands.joined import JoinedCommands
@@ -42,6 +43,7 @@ app.command("report")(report_command)
 app.command("export")(export_command)
 app.command("info")(info_command)
 app.command("study")(study_command)
+app.command("fit")(fit_command)
 
 
 def _tell_version(asked: bool):

@@ -10,6 +10,7 @@ from structure.limits import UTILISATIONS
 
 if TYPE_CHECKING:
     import xarray as xr
+    from numpy.typing import NDArray
 
 Place = dict[str, float]
 
@@ -49,7 +50,7 @@ def _utilisation(checked, name):
         return found if places is None else found | {around[0]: places[place].item()}
 
     record, place = np.unravel_index(int(np.argmax(values)), values.shape)
-    first = _passing_times(values, checked["time"].values)
+    first = passing_times(values, checked["time"].values)
     earliest = int(np.argmin(first))
     return {
         "largest": float(values[record, place]),
@@ -58,7 +59,7 @@ def _utilisation(checked, name):
     }
 
 
-def _passing_times(values, time):
+def passing_times(values: NDArray[np.float64], time: NDArray[np.float64]) -> NDArray[np.float64]:
     """Time at which each column of (n_time, n) values first exceeds 1, (n,) float64; infinite for never."""
     beyond = values > 1
     after = np.argmax(beyond, axis=0)

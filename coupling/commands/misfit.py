@@ -35,7 +35,8 @@ def misfit_command(
 
     JSON: `run`, `measurements` (path), `count`, `not_reached`, `chi_square` (per measurement), `probability`;
     `quantities` (name, count, chi_square, mean_residual, probability), worst first; `rows` (line, sensor, quantity,
-    tunnel, place, time [s], inflow_mass [kg/m], change, unit, measured, error, computed, residual); `data`, `figure`.
+    tunnel, place, time [s], inflow_mass [kg/m], change, unit, measured, error, common_error, computed, residual);
+    `data`, `figure`.
     """
     with answering(json_path) as answer:
         from coupling.datasets import run_file, write_dataset
@@ -66,7 +67,7 @@ def _data(found):
         for k, name in enumerate(found["quantity"].values.tolist())
     ]
     columns = ("line", "sensor", "tunnel", "place", "time", "inflow_mass", "change", "unit", "measured", "error",
-               "computed", "residual")  # fmt: skip
+               "common_error", "computed", "residual")  # fmt: skip
     rows = [
         {"quantity": name, **{key: _known(found[key].values[k].item()) for key in columns}}
         for k, name in enumerate(found["name"].values.tolist())

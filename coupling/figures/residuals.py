@@ -42,7 +42,7 @@ def _panels(values, left, own, scale):
     """One quantity: values with their errors, and residuals between lines of one and two errors."""
     along = own["run_time"]
     style = {"color": INITIAL, "fmt": "o", "ms": 3, "elinewidth": 0.8, "label": "measured, one standard deviation"}
-    values.errorbar(along, scale * own["measured"], scale * own["error"], **style)
+    values.errorbar(along, scale * own["measured"], scale * np.hypot(own["error"], own["common_error"]), **style)
     values.plot(along, scale * own["computed"], "x", color=GATE, ms=4, label="computed")
     for reach, shade in ((2, "0.94"), (1, "0.86")):
         left.axhspan(-reach, reach, color=shade, zorder=0)

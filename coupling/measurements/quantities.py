@@ -5,14 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
+import numpy as np
 import xarray as xr
 
-from coupling.datasets import opened, read_history, read_points, read_pressures, read_response
+from coupling.datasets import opened, read_history, read_mesh, read_points, read_pressures, read_response
 from coupling.datasets.geometry import gate_tunnel, on_tunnel
 from coupling.datasets.open_run import OpenRun, Run
+from coupling.postprocess.elements import element_fields
 from coupling.postprocess.settlement import surface_settlement
 from coupling.refused import Refused
 from structure.response import PRESSURES, RESPONSE, SHOWN, Shown
+
+NO_POINTS = "needs snapshots of the points, the run kept none; repeat it with output.points = true"
+GROUND = 0  # region of the mesh
+WAYS = ("vertical", "horizontal")
 
 
 class Measurable(NamedTuple):
@@ -21,7 +27,7 @@ class Measurable(NamedTuple):
     read : callable
         Takes an open run, lining model and tunnel; gives the run's values (time[, place]).
     place : str or None
-        Dimension that names the place: "theta" [degree], "joint" (number) or "x" [m].
+        Dimension that names the place: "theta" [degree], "joint" (number), "x" [m] or "ground", x [m] and depth.
     unit : str
         As pint reads it.
     of_tunnel : bool
@@ -56,6 +62,20 @@ def _of_lining(*names, shown):
     return Measurable(read, "theta", "Pa", True, shown)
 
 
+def _of_ground(*names, shown):
+    def read(run, *_):
+        if run.size("points", "time") is None:
+            raise Refused(f"{shown.name}: {NO_POINTS}")
+        mesh = read_mesh(run)
+        fields = element_fields(read_points(run), mesh)
+        values = sum(fields[name] for name in names)
+        ground = (mesh["region"].values == GROUND) & np.isfinite(values.values).all(axis=0)
+        width, depth = (float(mesh["x"].min()), float(mesh["x"].max())), -float(mesh["y"].min())
+        return values.isel(element=ground).assign_attrs(mesh.attrs, width=width, depth=depth)
+
+    return Measurable(read, "ground", "Pa", False, shown)
+
+
 def _inflow(run, *_):
     history = read_history(run)
     return history["inflow_mass"].reset_coords(drop=True)
@@ -63,12 +83,17 @@ def _inflow(run, *_):
 
 def _settlement(run, *_):
     if run.size("points", "time") is None:
-        raise Refused(
-            "surface_settlement: needs snapshots of the points, the run kept none; repeat it with output.points = true"
-        )
+        raise Refused(f"surface_settlement: {NO_POINTS}")
     settlement = surface_settlement(read_points(run))
     return settlement.dropna("x", how="all")
 
+
+#: In the ground: name, how people are shown it, and the quantities of the elements that it is the sum of.
+STRESSES = {
+    "pore_pressure": ("pore pressure", ("pore_pressure",)),
+    **{f"soil_stress_{way}": (f"{way} effective stress", (f"soil_stress_{way}",)) for way in WAYS},
+    **{f"total_stress_{way}": (f"{way} total stress", (f"soil_stress_{way}", "pore_pressure")) for way in WAYS},
+}
 
 #: By the name that a table of measurements gives them.
 QUANTITIES: dict[str, Measurable] = {
@@ -78,6 +103,10 @@ QUANTITIES: dict[str, Measurable] = {
         "soil_pressure", "water_pressure", shown=Shown("total pressure", "soil and water pressure", "kPa", 1e-3)
     ),
     "inflow_mass": Measurable(_inflow, None, "kg/m", False, Shown("inflow", "inflow mass", "kg/m", 1.0)),
+    **{
+        name: _of_ground(*parts, shown=Shown(text, f"{text} in the ground", "kPa", 1e-3))
+        for name, (text, parts) in STRESSES.items()
+    },
     "surface_settlement": Measurable(
         _settlement, "x", "m", False, Shown("settlement", "settlement of the ground surface", "mm", 1e3)
     ),

@@ -20,6 +20,11 @@ from structure.inputs import mistakes, shortened
 
 COLUMNS = tuple(name for name in Measurement.model_fields if name != "line")
 REQUIRED = ("quantity", "value", "unit", "error")
+#: Dimensions of a dataset and the cells that they fill.
+DIMENSIONS = {
+    "time": "time", "inflow_mass": "inflow_mass", "theta": "place", "joint": "place", "x": "place", "depth": "depth",
+    "tunnel": "tunnel",
+}  # fmt: skip
 #: Most mistakes that one message names.
 MOST_TOLD = 20
 
@@ -32,9 +37,10 @@ def read_measurements(source: str | Path | xr.Dataset) -> tuple[Measurement, ...
     source : path or xarray.Dataset
         A table: comma, semicolon or tab between cells, first line the names of the fields of `Measurement`, empty
         lines and those that begin with # passed over. Or a dataset, or its netCDF-4 file: variables named as the
-        quantities, over `time` or `inflow_mass` and `theta`, `joint` or `x`, each with the attribute `units` and its
-        error beside it as NAME_error; NaN is what was not measured; the attribute `change` = 1 marks changes since the
-        gate opened.
+        quantities, over `time` or `inflow_mass` and `theta`, `joint` or `x` (in the ground also `depth`), each with the
+        attribute `units` and its error beside it as NAME_error, one that its values share as NAME_common_error; NaN is
+        what was not measured; the attribute `change` = 1 marks changes since the gate opened, `sensor` names who
+        measured.
 
     Raises
     ------
@@ -131,7 +137,7 @@ def _checked_heads(number, heads):
 def _rows_of_dataset(dataset: xr.Dataset) -> Iterator[tuple[str, dict[str, Any]]]:
     """The same of a dataset; the line names variable and position."""
     for name in map(str, dataset.data_vars):
-        if name.endswith("_error") and name.removesuffix("_error") in dataset:
+        if any(name.endswith(end) and name.removesuffix(end) in dataset for end in ("_error", "_common_error")):
             continue
         if name not in QUANTITIES:
             near = difflib.get_close_matches(name, QUANTITIES, 1)
@@ -144,22 +150,22 @@ def _rows_of_variable(dataset, name):
     value, error = dataset[name], dataset.get(f"{name}_error")
     if error is None:
         raise _Unusable(f"{name}: must have its error beside it, got no {name}_error; add one standard deviation")
-    units = {array.attrs.get("units", value.attrs.get("units")) for array in (value, error)}
+    shared = dataset.get(f"{name}_common_error", xr.zeros_like(error))
+    units = {array.attrs.get("units", value.attrs.get("units")) for array in (value, error, shared)}
     if len(units) > 1 or None in units:
         got = ", ".join(sorted(map(str, units)))
-        raise _Unusable(f"{name}: must have an attribute units, and its error the same, got {got}; set them")
-    value, error = xr.broadcast(value, error)
-    unknown = [str(dim) for dim in value.dims if dim not in ("time", "inflow_mass", "theta", "joint", "x", "tunnel")]
+        raise _Unusable(f"{name}: must have an attribute units, and its errors the same, got {got}; set them")
+    value, error, shared = xr.broadcast(value, error, shared)
+    unknown = [str(dim) for dim in value.dims if dim not in DIMENSIONS]
     if unknown:
-        raise _Unusable(f"{name}: must be over time or inflow_mass, theta, joint, x, tunnel, got {unknown[0]}; "
-                        "rename that dimension")  # fmt: skip
+        raise _Unusable(f"{name}: must be over {', '.join(DIMENSIONS)}, got {unknown[0]}; rename that dimension")
     coordinates = {str(key): each.broadcast_like(value).values.ravel() for key, each in value.coords.items()}
     if {"time", "inflow_mass"} <= coordinates.keys():  # of a run both are known: that which is a dimension counts
         coordinates.pop("time" if "inflow_mass" in value.dims else "inflow_mass")
     common = {"quantity": name, "unit": units.pop(), "change": bool(value.attrs.get("change", False))}
-    names = {"theta": "place", "joint": "place", "x": "place", "time": "time", "inflow_mass": "inflow_mass",
-             "tunnel": "tunnel"}  # fmt: skip
+    common["sensor"] = value.attrs.get("sensor", name if shared.any() else "")
     for k in np.flatnonzero(np.isfinite(value.values.ravel())):
-        cells = {names[key]: column[k].item() for key, column in coordinates.items() if key in names}
-        cells |= {"value": value.values.ravel()[k].item(), "error": error.values.ravel()[k].item()}
-        yield f"{name}, value {k + 1}", cells | common
+        cells = {DIMENSIONS[key]: column[k].item() for key, column in coordinates.items() if key in DIMENSIONS}
+        numbers = {"value": value, "error": error, "common_error": shared}
+        cells |= {key: array.values.ravel()[k].item() for key, array in numbers.items()}
+        yield f"{name}, value {k + 1}", common | cells

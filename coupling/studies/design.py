@@ -7,7 +7,7 @@ import json
 import math
 import re
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
@@ -171,15 +171,27 @@ def load_study(study: str | Path | dict | Study) -> Study:
         return stored_study(study)
     origin = "study" if isinstance(study, dict) else f"study '{study}'"
     text = "" if isinstance(study, dict) else text_of("study", str(study), "studies", StudyError)
-    data = study if isinstance(study, dict) else parse_toml(text, origin)
+    return plan_of(Study, study if isinstance(study, dict) else text, origin, "`gush study table-2` is an example")
+
+
+Plan = TypeVar("Plan", bound=Part)
+
+
+def plan_of(model: type[Plan], source: str | dict, origin: str, example: str) -> Plan:
+    """A plan from its TOML text or nested dictionary.
+
+    Raises StudyError: every mistake found, with its line where there is a text; `example` is the remedy of those that
+    have none.
+    """
+    text = source if isinstance(source, str) else ""
     try:
-        return Study.model_validate(data)
+        return model.model_validate(parse_toml(text, origin) if isinstance(source, str) else source)
     except ValidationError as error:
         lines = []
-        for where, message in mistakes(error, Study):
+        for where, message in mistakes(error, model):
             message = ": ".join([*[".".join(map(str, where))] * bool(where), message])
             if ";" not in message:
-                message += "; correct it, `gush study table-2` is an example"
+                message += f"; correct it, {example}"
             number = _line(text, where or re.findall(r"\w+", message)[:1])
             lines.append(f"line {number}: {message}" if number else message)
         raise StudyError("\n  ".join([f"{origin} has {len(lines)} mistake{'s' * (len(lines) > 1)}:", *lines])) from None
@@ -216,16 +228,19 @@ def study_names() -> list[str]:
 
 
 def _range(name, table):
-    ends = {key: _in_unit(name, value) if key in ("low", "high") else value for key, value in table.items()}
     try:
-        return Range.model_validate(ends)
+        return Range.model_validate(in_units(name, table, ("low", "high")))
     except ValidationError as error:
         said = "; ".join(": ".join([*map(str, where), message]) for where, message in mistakes(error, Range))
         raise ValueError(f"{name}: must be a list of values or a range; {said}") from None
 
 
-def _in_unit(name, value):
+def in_units(name: str, table: dict[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:
+    """A table with the numbers under some keys in the unit of the parameter of that dotted name.
+
+    Raises ValueError: no quantity, or of another dimension.
+    """
     try:
-        return number_in_unit(name, value)
+        return {key: number_in_unit(name, value) if key in keys else value for key, value in table.items()}
     except ValueError as problem:
         raise ValueError(f"{name}: {problem}") from None

@@ -115,6 +115,69 @@ def test_state_at_an_inflow_mass_and_change_since_the_start(run, tmp_path):
     assert (found.attrs["count"], found.attrs["not_reached"]) == (2, 1)
 
 
+class Grid:
+    """Triangles 10 m wide, without a hole for the lining."""
+
+    x, y = np.meshgrid(np.linspace(-20.0, 20.0, 5), np.linspace(-40.0, 0.0, 5), indexing="ij")
+    nodes = np.column_stack([x.ravel(), y.ravel()])
+    corners = np.array([(5 * i + j, 5 * i + j + 5, 5 * i + j + 6, 5 * i + j + 1) for i in range(4) for j in range(4)])
+    elements = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
+    region = np.zeros(len(elements), int)
+
+
+def test_cell_in_the_ground_reads_a_linear_field_where_it_is(tmp_path, monkeypatch):
+    def points(time):
+        centres = Grid.nodes[Grid.elements].mean(axis=1)
+        found = original(time, count=len(centres))
+        found["x"], found["y"], found["removed"] = *centres.T, np.zeros(len(centres), bool)
+        found["stress_yy"] = 9e3 * found["y"] + 1e3 * found["x"]
+        found["pore_pressure"] = -9.81e3 * found["y"] * (1 - 0.1 * time)
+        return found
+
+    original = synthetic_run.points
+    monkeypatch.setattr(synthetic_run, "points", points)
+    monkeypatch.setattr(synthetic_run, "TwoTriangles", Grid)
+    run = synthetic_run.write_run(tmp_path / "run.nc", models=())
+    head = "quantity,place,depth,time,value,unit,error\n"
+    effective, water = 15 * 9.0 - 12.0, 15 * 9.81
+    text = f"total_stress_vertical,12 m,15 m,0,{effective + water!r},kPa,1\n"
+    text += f"soil_stress_vertical,12,1500 cm,0.5 s,{effective!r},kPa,1\n"
+    text += f"pore_pressure,12,15,0.5,{0.95 * water!r},kPa,1\n"
+    (tmp_path / "a.csv").write_text(head + text)
+    # a linear field is met exactly between centres of elements; points are stored as float32
+    np.testing.assert_allclose(misfit(run, tmp_path / "a.csv")["residual"], 0.0, atol=1e-4)
+    for line, message in (
+        ("pore_pressure,0,23.3,0,1,kPa,1", "line 2: place and depth: must lie in the ground, outside of the linings"),
+        ("pore_pressure,12,60,0,1,kPa,1", "at most 40 m deep, got x 12 m, 60 m deep"),
+        ("pore_pressure,12,,0,1,kPa,1", "line 2: depth: pore_pressure must have one"),
+        ("water_pressure,90,3,0,1,kPa,1", "line 2: depth: water_pressure has none, got 3"),
+    ):
+        (tmp_path / "a.csv").write_text(head + line + "\n")
+        with pytest.raises(Refused) as refused:
+            misfit(run, tmp_path / "a.csv")
+        assert message in str(refused.value)
+
+
+def test_errors_of_one_calibration_count_as_one(run, tmp_path):
+    """40 readings of a cell that is off by 3 common errors: chi square of 3^2 once more, not 40 times."""
+    pressure = read_pressures(run)["water_pressure"].sel(theta=90.0)
+    draw = np.random.default_rng(5).normal(size=40)
+    times = np.linspace(0.02, 0.98, 40)
+    values = pressure.interp(time=times).values + 500.0 * draw + 3 * 6000.0
+    numbers = zip(times.tolist(), values.tolist(), strict=True)
+    rows = [f"water_pressure,90,{time!r},{value!r},Pa,500,6000,P1" for time, value in numbers]
+    path = tmp_path / "field.csv"
+    path.write_text("quantity,place,time,value,unit,error,common_error,sensor\n" + "\n".join(rows) + "\n")
+    found = misfit(run, path)
+    # common and independent part of an equal shift c of n readings: n c^2 / (s^2 + n t^2) = 9 but for s^2 / (n t^2)
+    scatter = np.sum((draw - draw.mean()) ** 2)
+    assert found.attrs["chi_square"] * 40 == pytest.approx(scatter + 40 * (draw.mean() + 36.0) ** 2 / (1 + 40 * 144.0))
+    np.testing.assert_allclose(found["residual"], -(values - pressure.interp(time=times)) / np.hypot(500, 6000))
+    path.write_text(path.read_text().replace(",P1", ","))
+    with pytest.raises(Refused, match="line 2: sensor: must be named where a common_error is given"):
+        misfit(run, path)
+
+
 def test_dataset_with_errors_is_taken_as_the_table_is(run, tmp_path):
     response = read_response(run).isel(time=[1, 3])
     given = response[["joint_opening"]].reset_coords("inflow_mass", drop=True)
@@ -126,6 +189,8 @@ def test_dataset_with_errors_is_taken_as_the_table_is(run, tmp_path):
     assert found.sizes["measurement"] == response["joint_opening"].size - 1
     np.testing.assert_allclose(found["residual"], -3.0, rtol=1e-9)
     assert found["place"].values[2] == "joint 4"
+    shared = given.assign(joint_opening_common_error=((), 0.4, {"units": "mm"}))
+    np.testing.assert_allclose(misfit(run, shared)["residual"], -0.3 / np.hypot(0.1, 0.4), rtol=1e-9)
     given.to_netcdf(tmp_path / "field.nc", engine="h5netcdf")
     xr.testing.assert_equal(misfit(run, tmp_path / "field.nc"), found)
 
@@ -221,4 +286,5 @@ def test_every_quantity_can_be_read_of_a_run(run):
 
     for name, known in QUANTITIES.items():
         field = computed(run, name)
-        assert field.dims == ("time", *([known.place] if known.place else [])), name
+        place = {"ground": "element"}.get(known.place, known.place)
+        assert field.dims == ("time", *([place] if place else [])), name

@@ -17,7 +17,7 @@ FORBIDDEN = {
 #: Rooms of `coupling`: each imports only itself and those before it; the command line is last.
 ROOMS = (
     "refused", "scenes", "files", "datasets", "postprocess", "responses", "measurements", "figures", "export", "runs",
-    "studies", "report", "commands", "cli",
+    "studies", "fits", "report", "commands", "cli",
 )  # fmt: skip
 #: The same of `verification`.
 MEASURING = (
@@ -25,7 +25,10 @@ MEASURING = (
     "sensitivity", "stability", "speed", "robustness", "reports", "published", "commands",
 )  # fmt: skip
 ORDERS = [("coupling", room) for room in ROOMS] + [("verification", room) for room in MEASURING]
-HEAVY = ("numba", "xarray", "matplotlib", "scipy", "gmsh", "skfem", "pint", "dask", "distributed", "h5py", "meshio")
+HEAVY = (
+    "numba", "xarray", "matplotlib", "scipy", "gmsh", "skfem", "pint", "dask", "distributed", "h5py", "meshio",
+    "sklearn",
+)  # fmt: skip
 
 
 def imported(path: Path, executed: bool = False) -> set[str]:

@@ -101,11 +101,15 @@ def save(block):
 
 
 def read_toml(block):
-    """A TOML block must mean something: scene, study or limits; with a title it is saved for the page."""
+    """A TOML block must mean something: scene, study, priors or limits; with a title it is saved for the page."""
     data = tomllib.loads(block.text)
     if block.title:
         save(block)
-    if "parameters" in data:
+    if "parameters" in data and "name" not in data:
+        from coupling.fits.prior import read_plan
+
+        assert read_plan(data).study("quick"), block.place
+    elif "parameters" in data:
         from coupling.studies.cases import cases
         from coupling.studies.design import load_study
 
