@@ -159,6 +159,7 @@ def test_missing_scikit_learn_is_told_before_anything_runs(tmp_path, monkeypatch
     assert result.exit_code == 2 and "gushing[fit]" in result.output
 
 
+@pytest.mark.slow
 def test_command_finds_the_friction_angle_of_a_run_and_runs_nothing_twice(tmp_path, monkeypatch):
     import coupling
     from coupling.datasets import read_pressures

@@ -23,7 +23,7 @@ TRIALS = 20
 NOISE = 0.05
 END = 0.3  # [s]
 PLAN = {
-    "samples": 128,
+    "samples": 64,
     "records": 13,
     "parameters": {
         "gate.angle": {"low": 60.0, "high": 120.0},

@@ -1,6 +1,6 @@
 """Case 3 with a lining that is held, elastic or jointed in the ground, over the whole event: docs/two-way.md.
 
-uv run python -m verification.reports.two_way RUNS    # runs into the folder RUNS, or goes on with them; a quarter of an hour
+uv run python -m verification.reports.two_way RUNS    # runs into the folder RUNS, or goes on with them; minutes
 """
 
 import sys
