@@ -89,9 +89,12 @@ class RunEvidence:
     @cached_property
     def points(self):
         """The first snapshot and those around every one of :attr:`masses`, with inflow_mass (time)."""
+        return self._points_around((*self.masses, self.compared))
+
+    def _points_around(self, masses):
         points = postprocess.with_inflow(read_points(self.folder), self.history)
         mass = points["inflow_mass"].values
-        after = np.minimum(np.searchsorted(mass, self.masses), len(mass) - 1)
+        after = np.minimum(np.searchsorted(mass, masses), len(mass) - 1)
         return points.isel(time=sorted({0, *after, *np.maximum(after - 1, 0)}))
 
     @cached_property
@@ -106,10 +109,17 @@ class RunEvidence:
 
     @cached_property
     def settlement(self):
-        """Settlement of the surface (time, x) [m], with inflow_mass (time)."""
+        """Settlement of the surface (time, x) [m] at the snapshots of :attr:`points`, with inflow_mass (time)."""
+        return self._settlement(self.points)
+
+    def settled(self, mass: float) -> float:
+        """Largest settlement of the surface at an inflow mass [m]."""
+        return float(postprocess.at_inflow(self._settlement(self._points_around((mass,))), mass)["settlement"].max())
+
+    def _settlement(self, points):
         # the layer must be thicker than the points' distance from the surface in the largest elements
         thick = max(1.0, 0.5 * self.scene.discretisation.element_size)
-        settlement = postprocess.surface_settlement(self.points, spacing=thick, depth=thick).to_dataset()
+        settlement = postprocess.surface_settlement(points, spacing=thick, depth=thick).to_dataset()
         return postprocess.with_inflow(settlement, self.history)
 
     @cached_property

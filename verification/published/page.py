@@ -250,7 +250,7 @@ def _meshes(meshes):
         mass = min(run.compared for run in sizes.values())
         for size, run in sorted(sizes.items()):
             time = float(postprocess.at_inflow(run.history, mass)["time"])
-            down = 1e3 * float(postprocess.at_inflow(run.settlement, mass)["settlement"].max())
+            down = 1e3 * run.settled(mass)
             cells = [f"{value:.0f}" for value in _extremes(run.responses["beam-spring"], mass)]
             rows.append((name, f"{size:.2g} times", f"{mass:.0f}", f"{time:.3f}", *cells, f"{down:.1f}"))
     return _markdown(["scene", "mesh", "at kg/m", "time s", "N", "Q", "M", "M least", "settlement mm"], rows)
