@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import coupling
+from coupling.datasets import read_response
 from coupling.figures import GATE
 from coupling.postprocess import at_inflow
 from structure.response import FORCES
@@ -52,7 +53,7 @@ def states_of(folder, forces_from):
     pressures = run["lining"].to_dataset()
     if forces_from == "own":
         return pressures, pressures
-    return pressures, coupling.read_response(folder).assign_coords(inflow_mass=("time", pressures.inflow_mass.values))
+    return pressures, read_response(folder, "beam-spring")
 
 
 def rows_of(name, pressures, ring):
