@@ -51,6 +51,6 @@ def test_response_that_fails_leaves_the_pictures_of_the_ground(tmp_path):
     assert result.exit_code == 3
     assert "equilibrium" in result.stderr and "the ground is computed and drawn in" in result.stderr
     drawn = {path.stem for path in (tmp_path / "run" / "figures").glob("*.png")}
-    assert drawn == {"mesh", "fields", "pressures", "inflow"}
+    assert drawn == {"mesh", "fields", "pressures", "inflow", "settlement"}
     run = coupling.read_run(tmp_path / "run")
     assert run.attrs["status"] == "finished" and run["lining"].sizes["time"] == 3
