@@ -436,7 +436,7 @@ class Solver(Measures):
             yield
         except NoJointEquilibrium as problem:
             raise RunFailed(
-                str(problem), self.clock.time, self.mesh.nodes[self.mesh.outer_nodes[0]].mean(axis=0)
+                str(problem), self.clock.time, self.mesh.nodes[self.mesh.outer_nodes[problem.tunnel]].mean(axis=0)
             ) from problem
 
     def _run(self, first_pass, last_pass, batch=None, advance=True):

@@ -16,7 +16,7 @@ from scipy.sparse.linalg import splu
 from structure.discrete import DiscreteLining
 from structure.joint_laws import JointLaw
 from structure.lining import THETA
-from structure.ring_forces import uneven_gaps
+from structure.ring_forces import springs_at_joints, uneven_gaps
 
 #: Angles of the outer face at which displacements are kept; linear in between.
 FACE = np.radians(np.arange(0, 360, 0.5))
@@ -55,7 +55,7 @@ class ReducedRing:
 
     def __init__(self, lining: DiscreteLining, density: float, gravity: float, n_harmonics: int = 8):
         ring, parts = lining.ring, lining.parts
-        self.ring, self.outer_radius, self.radius = ring, ring.outer_radius, ring.centre_radius
+        self.outer_radius, self.radius = ring.outer_radius, ring.centre_radius
         self.law = JointLaw(ring)
         self.joints_linear = self.law.linear
         mass, rigid = density * parts.mass, parts.rigid.T
@@ -140,8 +140,8 @@ def _answers(lining: DiscreteLining, mass: sparse.csr_array, rigid: np.ndarray, 
     What a load has left over accelerates the ring as a whole; where loads balance each other so do these forces.
     """
     ring, parts = lining.ring, lining.parts
-    springs = np.array([ring.axial_stiffness, ring.axial_stiffness, ring.bending_stiffness]) / ring.centre_radius
-    joints = parts.jumps.T @ sparse.diags_array(np.tile(springs, parts.jumps.shape[0] // 3)) @ parts.jumps
+    along, across = ring.axial_stiffness / ring.centre_radius, ring.bending_stiffness / ring.centre_radius
+    joints = springs_at_joints(parts.jumps, (along, along, across))
     held, carried = (parts.segments + uneven_gaps(ring, parts) + joints).tocsr(), mass @ rigid
     phase = np.outer(FACE, np.arange(n_harmonics + 1))
     harmonics = np.hstack([np.cos(phase), np.sin(phase[:, 1:])])

@@ -79,13 +79,17 @@ def whole_movements(size: int, nodes: np.ndarray, angle: np.ndarray, lever: np.n
     return moved
 
 
+def springs_at_joints(jumps: sparse.csr_array, springs: tuple[float, float, float]) -> sparse.csr_array:
+    """Stiffness (n, n) of springs against opening, dislocation and rotation of every joint; jumps : (3 n_joints, n)."""
+    return (jumps.T @ sparse.diags_array(np.tile(springs, jumps.shape[0] // 3)) @ jumps).tocsr()
+
+
 def uneven_gaps(ring: Ring, parts: RingParts) -> sparse.csr_array:
     """What joints store in a gap beyond their jumps, (n, n): linear under any law; nothing where faces are plane."""
     if parts.linear_joints is None:
         return sparse.csr_array(parts.segments.shape)
     springs = ring.joint_normal_stiffness, ring.joint_shear_stiffness, ring.joint_rotational_stiffness
-    even = parts.jumps.T @ sparse.diags_array(np.tile(springs, parts.jumps.shape[0] // 3)) @ parts.jumps
-    return (parts.linear_joints - even).tocsr()
+    return (parts.linear_joints - springs_at_joints(parts.jumps, springs)).tocsr()
 
 
 class RingForces:

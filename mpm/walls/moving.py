@@ -224,7 +224,14 @@ def ring_impulse(stiffness, weight, displacement, dt, due):
 
 
 class NoJointEquilibrium(ArithmeticError):
-    """Joints whose forces could not be found in a step; the message says whose."""
+    """Joints whose forces could not be found in a step, of a `tunnel`."""
+
+    def __init__(self, tunnel):
+        self.tunnel = tunnel
+        super().__init__(
+            f"the joints of tunnel {tunnel} found no equilibrium with their ring and the ground: lower "
+            "ring.joint_rotational_stiffness, or leave joint_contact_height out"
+        )
 
 
 class MovingLinings:
@@ -325,10 +332,7 @@ class MovingLinings:
                 force, tangent, _ = ring.joint_forces(place, part.memory)
         else:
             if not np.linalg.norm(missed) <= MOST_MISSED * np.linalg.norm(actual):
-                raise NoJointEquilibrium(
-                    f"the joints of tunnel {part.tunnel} found no equilibrium with their ring and the ground: lower "
-                    "ring.joint_rotational_stiffness, or leave joint_contact_height out"
-                )
+                raise NoJointEquilibrium(part.tunnel)
         left += dt * missed
         part.memory[:] = remembered
 

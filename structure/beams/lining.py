@@ -18,7 +18,7 @@ from structure.beams.mesh import RingMesh, displacements_at, forces_at
 from structure.discrete import SIDES, DiscreteLining, Readings
 from structure.lining import THETA
 from structure.ring import Ring, check_ring
-from structure.ring_forces import RingParts, whole_movements
+from structure.ring_forces import RingParts, springs_at_joints, whole_movements
 
 
 class BeamSpringLining(DiscreteLining):
@@ -63,7 +63,7 @@ def _parts(ring: Ring, mesh: RingMesh) -> RingParts:
     values = np.concatenate([np.ones(2 * mesh.n_nodes), lever])
     return RingParts(
         segments=segment_stiffness(ring, mesh),
-        linear_joints=(jumps.T @ sparse.diags_array(np.tile(stiffness, len(mesh.joint_after))) @ jumps).tocsr(),
+        linear_joints=springs_at_joints(jumps, stiffness),
         jumps=jumps,
         feel=sparse.coo_array((values, place), shape=(2 * mesh.n_nodes, size)).tocsr(),
         area=np.tile(ring.outer_radius * mesh.node_span, 2),
