@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from structure.beams.lining import BeamSpringLining
     from structure.checks import check
-    from structure.continuum.bolts import Bolts
     from structure.continuum.lining import ContinuumLining
     from structure.continuum.mesh import GasketGroove, Gate
     from structure.inputs import GushingWarning, InputError
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
     from structure.lining import LiningFailure, LiningModel, additional
     from structure.models import lining_model, lining_model_names, register_lining_model
     from structure.passing import utilisations
-    from structure.ring import Ground, Ring
+    from structure.ring import Bolts, Ground, Ring
     from structure.segment import SegmentSection
     from structure.theory import theoretical_pressures
 
@@ -40,7 +39,7 @@ _HOMES = {
     "ContinuumLining": "structure.continuum.lining",
     "Gate": "structure.continuum.mesh",
     "GasketGroove": "structure.continuum.mesh",
-    "Bolts": "structure.continuum.bolts",
+    "Bolts": "structure.ring",
     "lining_model": "structure.models",
     "lining_model_names": "structure.models",
     "register_lining_model": "structure.models",

@@ -85,13 +85,11 @@ class BandedTangent:
     symmetric : bool
     ties : (n_ties, n) sparse, optional
         Elongation of springs between places far apart, which would widen the band: they join in as a low-rank update
-        of its factors (Woodbury).
-    tie_stiffness : float
-        Of each [N/m per m].
+        of its factors (Woodbury); their stiffnesses are the last coefficients.
     """
 
-    def __init__(self, constant, rows, pairs, place, held, symmetric: bool, ties=None, tie_stiffness: float = 0.0):
-        self.place, self.symmetric, self.tie_stiffness = place, symmetric, tie_stiffness
+    def __init__(self, constant, rows, pairs, place, held, symmetric: bool, ties=None):
+        self.place, self.symmetric = place, symmetric
         self.size = len(place)
         free = np.ones(self.size)
         free[held] = 0.0
@@ -129,9 +127,10 @@ class BandedTangent:
         """
         if self._constant is not None:
             return self._constant
-        solve = self._cholesky(coefficients) if self.symmetric else self._lu(coefficients)
+        banded = coefficients if self._ties is None else coefficients[: -self._ties.shape[1]]
+        solve = self._cholesky(banded) if self.symmetric else self._lu(banded)
         if self._ties is not None:
-            solve = self._tied(solve)
+            solve = self._tied(solve, coefficients[-self._ties.shape[1] :])
         if not len(coefficients):
             self._constant = solve
         return solve
@@ -182,12 +181,12 @@ class BandedTangent:
 
         return solve_in_place
 
-    def _tied(self, solve):
+    def _tied(self, solve, stiffness):
         by_tie = solve(self._ties)
-        compliance = np.eye(self._ties.shape[1]) / self.tie_stiffness + self._ties.T @ by_tie
+        coupling = np.eye(len(stiffness)) + stiffness[:, None] * (self._ties.T @ by_tie)
 
         def solve_tied(right):
             step = solve(right)
-            return step - by_tie @ np.linalg.solve(compliance, self._ties.T @ step)
+            return step - by_tie @ np.linalg.solve(coupling, stiffness * (self._ties.T @ step))
 
         return solve_tied

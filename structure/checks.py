@@ -53,7 +53,7 @@ def check(response: xr.Dataset, limits: Limits) -> xr.Dataset:
     if limits.capacity is not None:
         variables |= _segment_checks(response, limits, ring.thickness)
     if limits.joint_contact_height is not None:
-        variables |= _bearing_check(response, limits, ring.thickness)
+        variables |= _bearing_check(response, limits, ring)
     if limits.crack_width is not None:
         variables |= _crack_check(response, limits, ring.thickness)
     if limits.gasket_opening is not None:
@@ -114,10 +114,14 @@ def _meaning(units, long_name):
     return {"units": units, "long_name": long_name}
 
 
-def _bearing_check(response, limits, thickness):
-    rule = limits.capacity
-    axial = rule.axial_force_factor * np.maximum(response["joint_axial_force"], 0.0)
-    moment = rule.moment_factor * response["joint_bending_moment"]
+def _bearing_check(response, limits, ring):
+    rule, thickness = limits.capacity, ring.thickness
+    pressed, turned = response["joint_axial_force"], response["joint_bending_moment"]
+    if "joint_bolt_force" in response:  # what bolts pull presses the faces together
+        pull, offset = response["joint_bolt_force"], np.array([bolts.offset for bolts in ring.bolts])
+        pressed, turned = pressed + pull, turned - pull * offset
+    axial = rule.axial_force_factor * np.maximum(pressed, 0.0)
+    moment = rule.moment_factor * turned
     resisted = axial.copy(
         data=bearing_resistance(
             limits.segment, thickness, limits.joint_contact_height, axial.values, moment.values

@@ -15,17 +15,23 @@ from scipy import sparse
 from threadpoolctl import threadpool_limits
 
 from structure.balance import borne, even_loads, without_unborne
-from structure.lining import THETA, LiningFailure, LiningModel, response_dataset
+from structure.lining import THETA, LiningFailure, LiningModel, origin, response_dataset
 from structure.newton import NoEquilibrium, RingEquilibrium
 from structure.pressures import check_pressures
 from structure.response import FORCES
 from structure.ring import Ring
 from structure.ring_forces import RingParts
 
+#: Units and long name of the one variable that only rings with bolts have.
+BOLT_FORCE = {"units": "N/m", "long_name": "force in the bolts of a joint per metre of tunnel, tension positive"}
 #: Both sides of an angle [rad]: at a joint the mean of the two is given.
 SIDES = (-1e-9, 1e-9)
 #: Matrices are so small that threads only wait for each other: on a busy machine two cost 200 times one's time.
 one_thread = threadpool_limits.wrap(limits=1, user_api="blas")
+
+
+def _described(values, units, long_name):
+    return values, {"units": units, "long_name": long_name}
 
 
 class Readings(NamedTuple):
@@ -39,6 +45,7 @@ class Readings(NamedTuple):
         displacements are NaN.
     near_force : (n_theta,) bool, next to forces that are concentrated: there Q is no slope of M.
     weight_offset : distance of the weight from the centre line, outward [m].
+    bolt_shares : N, Q and M, (n_theta, n_joints) each, from the pull of bolts that are no part of the segments.
     """
 
     forces: tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array]
@@ -48,11 +55,13 @@ class Readings(NamedTuple):
     lined: np.ndarray
     near_force: np.ndarray
     weight_offset: float
+    bolt_shares: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
 
 
 class States(NamedTuple):
-    """Equilibrium at every time: loads on the unknowns, displacements (n_times, n), slips of the joints before
-    (n_times, n_joints), reactions of the soil springs (n_times, n_springs); balanced uplift, unborne share (n_times,).
+    """Equilibrium at every time: loads on the unknowns, displacements (n_times, n), slips of the joints, or of
+    points of their faces, before (n_times, law.count), reactions of the soil springs (n_times, n_springs); balanced
+    uplift, unborne share (n_times,).
     """
 
     loads: np.ndarray
@@ -103,13 +112,56 @@ class DiscreteLining(LiningModel):
         checked = check_pressures(pressures, self.ring)
         states = self.solve(checked)
         fields = {"balanced_uplift": states.balanced, "unborne_resultant": states.unborne}
-        read = zip(FORCES, self.readings.forces, strict=True)
-        fields |= {name: self._where_lined((part @ states.displacements.T).T) for name, part in read}
+        fields |= {name: self._where_lined(force) for name, force in self._section_forces(states.displacements)}
         fields |= self.joint_fields(states)
         fields |= self._balances(states)
         fields["shear_moment_residual"] = self._shear_moment_residual(fields, states, checked)
         fields |= self._movements(states.displacements)
         return response_dataset(self.ring, checked, fields, self.name, self.details())
+
+    def _section_forces(self, displacements):
+        forces = [(part @ displacements.T).T for part in self.readings.forces]
+        if self.readings.bolt_shares is not None:
+            pull, _ = self._equilibrium.bolt_forces(displacements)
+            forces = [force + pull @ share.T for force, share in zip(forces, self.readings.bolt_shares, strict=True)]
+        return zip(FORCES, forces, strict=True)
+
+    @one_thread
+    def contact_field(self, pressures: xr.Dataset) -> xr.Dataset:
+        """What the faces of the joints exert on each other where ``ring.joint_contact`` is "face".
+
+        Parameters
+        ----------
+        pressures : xarray.Dataset
+            As for `respond`.
+
+        Returns
+        -------
+        xarray.Dataset
+            contact_pressure, contact_shear [Pa] and contact_gap [m] (time, contact_point), and of every point its joint
+            and its place outward from the centre line, `lever` [m].
+        """
+        if self.parts.faces is None:
+            raise ValueError("contact_field: joint_contact of the ring must be 'face', got 'section'; set it")
+        checked, points = check_pressures(pressures, self.ring), self.parts.law.points
+        states = self.solve(checked)
+        forces = self._equilibrium.joint_forces(states.displacements, states.slips)
+        gap = self._equilibrium.moved(states.displacements)[..., 0]
+        fields = {
+            "contact_pressure": (forces.axial / points.length, "Pa", "pressure between the faces of a joint"),
+            "contact_shear": (forces.shear / points.length, "Pa", "shear between the faces of a joint, as of Q"),
+            "contact_gap": (gap, "m", "gap between the faces of a joint, overlap of the springs negative"),
+        }
+        places = {
+            "joint": (points.joint + 1, "1", "joint number, clockwise from the crown"),
+            "lever": (points.lever, "m", "distance outward from the centre line"),
+        }
+        return xr.Dataset(
+            {name: (("time", "contact_point"), *_described(*about)) for name, about in fields.items()},
+            {name: ("contact_point", *_described(*about)) for name, about in places.items()}
+            | {"time": checked["time"]},
+            {"title": f"contact in the joints: {self.name} model"} | origin(self.ring, self.name) | self.details(),
+        )
 
     def details(self) -> dict[str, str | float]:
         """Attributes of a response that only this model has."""
@@ -156,9 +208,24 @@ class DiscreteLining(LiningModel):
 
     def joint_fields(self, states: States) -> dict[str, np.ndarray]:
         """Movements of and forces in the joints, (n_times, n_joints) each."""
-        opening, dislocation, rotation = np.moveaxis(self._equilibrium.jumps(states.displacements), -1, 0)
-        axial, shear, moment, *_ = self._equilibrium.joint_forces(states.displacements, states.slips)
-        return {
+        equilibrium, parts = self._equilibrium, self.parts
+        opening, dislocation, rotation = np.moveaxis(equilibrium.jumps(states.displacements), -1, 0)
+        forces = equilibrium.joint_forces(states.displacements, states.slips)
+        if parts.faces is None:
+            axial, shear, moment = forces.axial, forces.shear, forces.moment
+        else:
+            points = parts.law.points
+            of_joint = sparse.coo_array((np.ones(len(points.joint)), (np.arange(len(points.joint)), points.joint)))
+            axial, shear, moment = (
+                each @ of_joint for each in (forces.axial, forces.shear, -forces.axial * points.lever)
+            )
+        fields = {}
+        if parts.bolts is not None:
+            pull, _ = equilibrium.bolt_forces(states.displacements)
+            fields["joint_bolt_force"] = ("time", "joint"), pull, BOLT_FORCE
+            axial = axial - pull
+            moment = moment + np.array([bolts.offset for bolts in self.ring.bolts]) * pull
+        return fields | {
             "joint_opening": opening,
             "joint_dislocation": dislocation,
             "joint_rotation": rotation,

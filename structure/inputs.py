@@ -9,14 +9,23 @@ import reprlib
 import textwrap
 import warnings
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Discriminator, Tag, ValidationError
 
 from structure.plausibility import Usual, unusual
 
 #: Path of a key in nested tables and the message about it.
 Mistake = tuple[tuple[Any, ...], str]
+
+_Entry = TypeVar("_Entry")
+#: Ways to read an entry, which pydantic puts into the location of a mistake.
+_WAYS = ("one", "several")
+#: One entry, or a tuple of them.
+OneOrSeveral = Annotated[
+    Annotated[_Entry, Tag("one")] | Annotated[tuple[_Entry, ...], Tag("several")],
+    Discriminator(lambda value: "several" if isinstance(value, list | tuple) else "one"),
+]
 
 _LIMITS = {"gt": "above", "ge": "from", "lt": "below", "le": "up to"}
 
@@ -62,7 +71,11 @@ class Input(BaseModel):
 
     def unusual(self) -> dict[str, str]:
         """Values of another order of magnitude than any that is usual: name to what to think of."""
-        told = {name: unusual(getattr(self, name), *usual) for name, usual in self.usual.items()}
+        told = {}
+        for name, usual in self.usual.items():
+            given = getattr(self, name)
+            hints = (unusual(entry, *usual) for entry in (given if isinstance(given, tuple) else (given,)))
+            told[name] = next(filter(None, hints), "")
         return {name: hint for name, hint in told.items() if hint}
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
@@ -125,6 +138,7 @@ def mistakes(
     found: list[Mistake] = []
     missing: dict[tuple[Any, ...], list[str]] = {}
     for item in error.errors(include_url=False):
+        item["loc"] = tuple(part for part in item["loc"] if part not in _WAYS)
         if item["type"] == "missing":
             if item["loc"][-1] not in silent:
                 missing.setdefault(item["loc"][:-1], []).append(str(item["loc"][-1]))

@@ -16,25 +16,40 @@ from structure.ring import Ring
 #: Share of the stiffness of joint or segment, whichever is less, kept in the *tangent* only of a joint that is open,
 #: sliding or nearly hinged: the ring stays factorisable, and convergence slows by no more than this factor a step.
 TANGENT_FLOOR = 1e-6
+#: Points of a face where a joint touches along it.
+FACE_POINTS = 40
 
 
 class JointForces(NamedTuple):
-    """Forces in joints and how they change.
+    """Forces in joints, or at points of their faces, and how they change.
 
-    axial : N [N/m], compression positive;  shear : Q [N/m];  moment : M [N m/m], each (..., n_joints).
-    tangent : (..., n_joints, 3, 3) change of (-N, Q, M) per (opening, dislocation, rotation).
-    slip : (..., n_joints) irreversible part of the dislocation once these forces are taken as reached [m].
+    resisting : (..., n, k) against what moves: -N, Q and M of a joint (k = 3), -N and Q of a point (k = 2).
+    tangent : (..., n, k, k) its change with opening, dislocation and rotation.
+    slip : (..., n) irreversible part of the dislocation once these forces are taken as reached [m].
     """
 
-    axial: np.ndarray
-    shear: np.ndarray
-    moment: np.ndarray
+    resisting: np.ndarray
     tangent: np.ndarray
     slip: np.ndarray
 
+    @property
+    def axial(self) -> np.ndarray:
+        """N [N/m], compression positive, (..., n)."""
+        return -self.resisting[..., 0]
+
+    @property
+    def shear(self) -> np.ndarray:
+        """Q [N/m], (..., n)."""
+        return self.resisting[..., 1]
+
+    @property
+    def moment(self) -> np.ndarray:
+        """M [N m/m] of a joint, (..., n)."""
+        return self.resisting[..., 2]
+
 
 def contact_moment(
-    rotation: np.ndarray, axial_force: np.ndarray, stiffness: float, height: float
+    rotation: np.ndarray, axial_force: np.ndarray, stiffness: np.ndarray, height: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Moment of a joint whose faces press on each other but cannot pull, and its derivatives.
 
@@ -53,9 +68,9 @@ def contact_moment(
         phi [rad].
     axial_force : (...) float64
         N [N/m], compression positive.
-    stiffness : float
+    stiffness : (...) float64
         k [N m/rad per metre], while the whole height is compressed.
-    height : float
+    height : (...) float64
         h [m].
 
     Returns
@@ -78,7 +93,7 @@ def contact_moment(
 
 
 def limited_shear(
-    dislocation: np.ndarray, slip: np.ndarray, axial_force: np.ndarray, stiffness: float, friction: float
+    dislocation: np.ndarray, slip: np.ndarray, axial_force: np.ndarray, stiffness: np.ndarray, friction: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Shear force of a joint that slides where its stiffness asks for more than friction gives (return mapping).
 
@@ -90,9 +105,9 @@ def limited_shear(
         d and its irreversible part so far [m].
     axial_force : (...) float64
         N [N/m]; a joint in tension has no friction.
-    stiffness : float
-        k [N/m per metre].
-    friction : float
+    stiffness : (...) float64
+        k [N/m per metre], above 0.
+    friction : (...) float64
         mu [-].
 
     Returns
@@ -106,12 +121,12 @@ def limited_shear(
     shear = np.clip(trial, -limit, limit)
     by_dislocation = np.where(sliding, 0.0, stiffness)
     by_axial_force = np.where(sliding & (axial_force > 0), friction * np.sign(trial), 0.0)
-    slip = np.where(sliding, dislocation - shear / stiffness, slip) if stiffness > 0 else slip
+    slip = np.where(sliding, dislocation - shear / stiffness, slip)
     return shear, by_dislocation, by_axial_force, slip
 
 
 class JointLaw:
-    """The law of every joint of a ring.
+    """The law of every joint of a ring, on the mean movement of its faces.
 
     Parameters
     ----------
@@ -126,58 +141,153 @@ class JointLaw:
         The forces derive from a convex energy.
     remembers : bool
         The forces depend on the way there (sliding).
+    count, moves : int
+        How many joints there are, and in how many ways each moves.
+    springs : (count, moves) float64
+        Stiffness against each, while nothing limits it.
     """
 
+    moves = 3
+
     def __init__(self, ring: Ring):
-        self.normal = ring.joint_normal_stiffness
-        self.shear = ring.joint_shear_stiffness
-        self.rotation = ring.joint_rotational_stiffness
+        self.count = len(ring.joint_angles)
+        self.springs = ring.joint_springs
+        self.normal, self.shear, self.rotation = self.springs.T
         along, across = ring.axial_stiffness / ring.centre_radius, ring.bending_stiffness / ring.centre_radius
-        self.floors = TANGENT_FLOOR * np.minimum([self.normal, self.shear, self.rotation], [along, along, across])
+        self.floors = TANGENT_FLOOR * np.minimum(self.springs, [along, along, across])
         self.contact_only = ring.joint_contact_only
-        self.height = ring.joint_contact_height
-        self.friction = ring.joint_friction_coefficient
+        self.height, self.friction = (
+            None if getattr(ring, name) is None else ring.per_joint(name)
+            for name in ("joint_contact_height", "joint_friction_coefficient")
+        )
         self.remembers = self.friction is not None and bool(ring.joint_angles)
         limited = self.contact_only or self.height is not None or self.friction is not None
         self.linear = not (limited and ring.joint_angles)
         self.conservative = self.linear or (self.height is None and self.friction is None)
 
-    def forces(self, jumps: np.ndarray, slip: np.ndarray) -> JointForces:
+    def forces(self, moved: np.ndarray, slip: np.ndarray) -> JointForces:
         """Forces in the joints.
 
         Parameters
         ----------
-        jumps : (..., n_joints, 3) float64
+        moved : (..., n_joints, 3) float64
             Opening [m], dislocation [m], rotation [rad].
         slip : (..., n_joints) float64
             Slip before [m]; zero for a joint that never slid.
         """
-        opening, dislocation, rotation = np.moveaxis(jumps, -1, 0)
-        tangent = np.zeros((*jumps.shape, 3))
+        opening, dislocation, rotation = np.moveaxis(moved, -1, 0)
+        tangent = np.zeros((*moved.shape, 3))
         gap = opening > 0 if self.contact_only else np.zeros(opening.shape, dtype=bool)
         axial = np.where(gap, 0.0, -self.normal * opening)
-        tangent[..., 0, 0] = np.where(gap, self.floors[0], self.normal)
+        tangent[..., 0, 0] = np.where(gap, self.floors[:, 0], self.normal)
         axial_by_opening = np.where(gap, 0.0, -self.normal)
         if self.friction is None:
-            shear, by_dislocation = self.shear * dislocation, np.asarray(self.shear)
+            shear, by_dislocation = self.shear * dislocation, self.shear
         else:
             shear, by_dislocation, by_axial, slip = limited_shear(dislocation, slip, axial, self.shear, self.friction)
             tangent[..., 1, 0] = by_axial * axial_by_opening
-        tangent[..., 1, 1] = np.maximum(by_dislocation, self.floors[1])
+        tangent[..., 1, 1] = np.maximum(by_dislocation, self.floors[:, 1])
         if self.height is None:
-            moment, by_rotation = self.rotation * rotation, np.asarray(self.rotation)
+            moment, by_rotation = self.rotation * rotation, self.rotation
         else:
             moment, by_rotation, by_axial = contact_moment(rotation, axial, self.rotation, self.height)
             tangent[..., 2, 0] = by_axial * axial_by_opening
-        tangent[..., 2, 2] = np.maximum(by_rotation, self.floors[2])
-        return JointForces(axial, shear, moment, tangent, slip)
+        tangent[..., 2, 2] = np.maximum(by_rotation, self.floors[:, 2])
+        return JointForces(np.stack([-axial, shear, moment], axis=-1), tangent, slip)
 
-    def states(self, jumps: np.ndarray, forces: JointForces) -> list[str]:
-        """What each joint does, in words, from its jumps (n_joints, 3) and forces."""
+    def states(self, moved: np.ndarray, forces: JointForces) -> list[str]:
+        """What each joint does, in words, from its movements (n_joints, 3) and forces."""
         compression = np.maximum(forces.axial, 0.0)
-        happens = {"open": (jumps[:, 0] > 0) & self.contact_only}
+        happens = {"open": (moved[:, 0] > 0) & self.contact_only}
         if self.height is not None:
             happens["gaping at one edge"] = np.abs(forces.moment) > compression * self.height / 6
         if self.friction is not None:
             happens["sliding"] = np.abs(forces.shear) >= compression * self.friction
-        return [", ".join(word for word in happens if happens[word][k]) or "closed" for k in range(len(jumps))]
+        return [", ".join(word for word in happens if happens[word][k]) or "closed" for k in range(len(moved))]
+
+
+class FacePoints(NamedTuple):
+    """Points of the faces of all joints, those of one joint after the other.
+
+    joint : (n,) int;  lever : (n,) float64, outward from the centre line [m];  length : (n,) float64, of the face that
+    each stands for [m].
+    """
+
+    joint: np.ndarray
+    lever: np.ndarray
+    length: np.ndarray
+
+
+class FaceLaw:
+    """Contact along the faces of the joints: every point presses where they overlap, and slides by friction.
+
+    Parameters
+    ----------
+    ring : Ring
+        Its ``joint_contact`` is "face"; normal and shear stiffness are spread evenly over the contact height.
+    points : FacePoints
+
+    Attributes
+    ----------
+    As of :class:`JointLaw`, of points instead of joints.
+    """
+
+    moves, linear = 2, False
+
+    def __init__(self, ring: Ring, points: FacePoints):
+        self.points, self.count = points, len(points.joint)
+        share = points.length / np.bincount(points.joint, points.length)[points.joint]
+        self.springs = share[:, None] * ring.joint_springs[points.joint, :2]
+        self.normal, self.shear = self.springs.T
+        along = ring.axial_stiffness / ring.centre_radius * share
+        self.floors = TANGENT_FLOOR * np.minimum(self.springs.T, along)
+        friction = ring.joint_friction_coefficient
+        self.friction = None if friction is None else ring.per_joint("joint_friction_coefficient")[points.joint]
+        self.conservative, self.remembers = friction is None, friction is not None
+
+    def forces(self, moved: np.ndarray, slip: np.ndarray) -> JointForces:
+        """Forces at the points from gap and slide (..., n, 2) [m] and the slip before (..., n) [m]."""
+        opening, slide = np.moveaxis(moved, -1, 0)
+        tangent = np.zeros((*moved.shape, 2))
+        apart = opening > 0
+        axial = np.where(apart, 0.0, -self.normal * opening)
+        tangent[..., 0, 0] = np.where(apart, self.floors[0], self.normal)
+        if self.friction is None:
+            shear, by_slide = self.shear * slide, self.shear
+        else:
+            shear, by_slide, by_axial, slip = limited_shear(slide, slip, axial, self.shear, self.friction)
+            tangent[..., 1, 0] = np.where(apart, 0.0, -self.normal * by_axial)
+        tangent[..., 1, 1] = np.maximum(by_slide, self.floors[1])
+        return JointForces(np.stack([-axial, shear], axis=-1), tangent, slip)
+
+    def states(self, moved: np.ndarray, forces: JointForces) -> list[str]:
+        """What each joint does, in words, from the movements (n, 2) and forces of its points."""
+        return [", ".join(filter(None, self._state(moved, forces, joint))) or "closed"
+                for joint in range(self.points.joint.max() + 1)]  # fmt: skip
+
+    def _state(self, moved, forces, joint):
+        here = self.points.joint == joint
+        apart = moved[here, 0] > 0
+        gaps = "open" if apart.all() else "gaping at one edge" if apart.any() else ""
+        if self.friction is None or apart.all():
+            return gaps, ""
+        slides = np.abs(forces.shear[here]) >= self.friction[here] * forces.axial[here]
+        return gaps, "sliding" if slides[~apart].all() else ""
+
+
+class BoltLaw:
+    """Bolts across the joints, as of :class:`structure.ring.Bolts`: they pull once their slack is used up.
+
+    Parameters
+    ----------
+    ring : Ring
+    """
+
+    def __init__(self, ring: Ring):
+        stated = [(bolts.stiffness, bolts.slack, bolts.preload) for bolts in ring.bolts]
+        self.stiffness, self.slack, self.preload = np.array(stated).reshape(-1, 3).T
+
+    def pull(self, elongation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Force [N/m] and its derivative [N/m2] at elongations (..., n_joints) [m]."""
+        force = self.preload + self.stiffness * (elongation - self.slack)
+        return np.maximum(force, 0.0), np.where(force > 0, self.stiffness, TANGENT_FLOOR * self.stiffness)

@@ -155,9 +155,12 @@ class Limits(Input):
                 " it counts from the centre line"
             )
         height, touching = self.joint_contact_height, ring.joint_contact_height
-        if height is not None and (height > ring.thickness or (touching is not None and height != touching)):
-            largest = ring.thickness if touching is None else touching
-            rule = "be at most the thickness" if touching is None else "be the joint_contact_height of the ring,"
+        if height is None:
+            return
+        largest, one_for_all = ring.contact_heights.min(), isinstance(touching, float)
+        if height > largest or (one_for_all and height != touching):
+            least = "be at most the thickness" if touching is None else "be at most the least of the ring,"
+            rule = "be the joint_contact_height of the ring," if one_for_all else least
             raise ValueError(
                 f"joint_contact_height must {rule} {largest:g} m, got {height:g} m; correct one of the two"
             )

@@ -1,10 +1,10 @@
 """A ring of few coordinates that another program may move step by step, reduced from a lining model without a loss.
 
 Whatever the joints do, a ring at rest obeys (K + J^T k J) q = f + J^T (k J q - s), with K the stiffness of its
-segments (and of gaps that are not plane), J the jumps of its joints, s the forces in them and k any springs in their
-place. So all its equilibria are sums of answers of the ring with these springs: to the loads on its face, and to a pair
-of forces at every joint. The first are taken as harmonics, which is the only error; beside these the ring moves as a
-whole.
+segments (and of gaps that are not plane), J the jumps of its joints and how much their bolts grow, s the forces in
+them and k any springs in their place. So all its equilibria are sums of answers of the ring with these springs: to the
+loads on its face, and to a pair of forces at every joint. The first are taken as harmonics, which is the only error;
+beside these the ring moves as a whole.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from structure.discrete import DiscreteLining
-from structure.joint_laws import JointLaw
+from structure.inputs import InputError
 from structure.lining import THETA
-from structure.ring_forces import springs_at_joints, uneven_gaps
+from structure.ring_forces import springs_at
 
 #: Angles of the outer face at which displacements are kept; linear in between.
 FACE = np.radians(np.arange(0, 360, 0.5))
@@ -50,14 +50,19 @@ class ReducedRing:
     jumps : (n_joints, 3, m) float64
         Opening [m], dislocation [m] and rotation [rad] of the joints.
     joints_linear : bool
-        Whether the stiffness contains the joints; else :meth:`joint_forces` gives what they add.
+        Whether the stiffness contains the joints and there are no bolts; else :meth:`joint_forces` gives what they add.
     """
 
     def __init__(self, lining: DiscreteLining, density: float, gravity: float, n_harmonics: int = 8):
         ring, parts = lining.ring, lining.parts
         self.outer_radius, self.radius = ring.outer_radius, ring.centre_radius
-        self.law = JointLaw(ring)
-        self.joints_linear = self.law.linear
+        if parts.faces is not None:
+            raise InputError(
+                "ring: joint_contact must be 'section' for a ring that moves in the ground, got 'face'; give"
+                " joint_contact_height and joint_contact_only instead"
+            )
+        self.law, self.bolt_law = parts.law, parts.bolt_law
+        self.joints_linear = self.law.linear and self.bolt_law is None
         mass, rigid = density * parts.mass, parts.rigid.T
         deformed = _orthonormal(_answers(lining, mass, rigid, n_harmonics), mass)
         deformed *= np.sqrt(mass_of_ring := float(rigid[:, 0] @ (mass @ rigid[:, 0])))
@@ -66,18 +71,16 @@ class ReducedRing:
         self.mass[:3, :3] = rigid.T @ (mass @ rigid)
         np.fill_diagonal(self.mass[3:, 3:], mass_of_ring)
         self.weight = -gravity * (self.basis.T @ (mass @ rigid[:, 1]))
-        held = parts.segments
-        if parts.ties is not None:
-            held = held + parts.tie_stiffness * (parts.ties.T @ parts.ties)
-        if not self.law.linear:
-            held = held + uneven_gaps(ring, parts)
-        elif parts.linear_joints is not None:
-            held = held + parts.linear_joints
+        held = parts.linear if self.law.linear else parts.body
         self.stiffness = np.zeros_like(self.mass)
         self.stiffness[3:, 3:] = deformed.T @ (held @ deformed)
         jumps = parts.jumps @ self.basis
         jumps[:, :3] = 0.0
         self.jumps = jumps.reshape(-1, 3, self.basis.shape[1])
+        if parts.bolts is not None:
+            self.elongation = parts.bolts @ self.basis
+            self.elongation[:, :3] = 0.0
+        self._bolt_shares = lining.readings.bolt_shares
         self._readings = [part @ self.basis for part in lining.readings.forces]
         arc = self.outer_radius * FACE[1]
         inward, clockwise = lining.tractions(FACE)
@@ -111,7 +114,7 @@ class ReducedRing:
         return tuple((1 - share) * part[first] + share * part[second] for part in (self._outward, self._clockwise))
 
     def joint_forces(self, displacement: np.ndarray, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Forces that hold the joints as they are, on the coordinates, where their law is not linear.
+        """Forces that hold the joints as they are, on the coordinates, where their law is not linear, and their bolts.
 
         Parameters
         ----------
@@ -124,14 +127,23 @@ class ReducedRing:
         -------
         force, tangent, slip : (m,), (m, m), (n_joints,) float64
         """
-        axial, shear, moment, tangent, slip = self.law.forces(self.jumps @ displacement, slip)
-        force = np.einsum("jkm,jk->m", self.jumps, np.stack([-axial, shear, moment], axis=-1))
-        return force, np.einsum("jkm,jkn->mn", self.jumps, tangent @ self.jumps), slip
+        resisting, tangents, slip = self.law.forces(self.jumps @ displacement, slip)
+        force = np.einsum("jkm,jk->m", self.jumps, resisting)
+        tangent = np.einsum("jkm,jkn->mn", self.jumps, tangents @ self.jumps)
+        if self.bolt_law is not None:
+            pull, stiffening = self.bolt_law.pull(self.elongation @ displacement)
+            force += self.elongation.T @ pull
+            tangent += self.elongation.T @ (stiffening[:, None] * self.elongation)
+        return force, tangent, slip
 
     def internal_forces(self, displacement: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """N, Q [N/m] and M [N m/m] at theta [rad], (n,) float64 each; signs: `structure.response`."""
         around = np.degrees(theta)
-        return tuple(np.interp(around, THETA, part @ displacement, period=360.0) for part in self._readings)
+        forces = [part @ displacement for part in self._readings]
+        if self._bolt_shares is not None:
+            pull, _ = self.bolt_law.pull(self.elongation @ displacement)
+            forces = [force + share @ pull for force, share in zip(forces, self._bolt_shares, strict=True)]
+        return tuple(np.interp(around, THETA, force, period=360.0) for force in forces)
 
 
 def _answers(lining: DiscreteLining, mass: sparse.csr_array, rigid: np.ndarray, n_harmonics: int) -> np.ndarray:
@@ -141,11 +153,12 @@ def _answers(lining: DiscreteLining, mass: sparse.csr_array, rigid: np.ndarray, 
     """
     ring, parts = lining.ring, lining.parts
     along, across = ring.axial_stiffness / ring.centre_radius, ring.bending_stiffness / ring.centre_radius
-    joints = springs_at_joints(parts.jumps, (along, along, across))
-    held, carried = (parts.segments + uneven_gaps(ring, parts) + joints).tocsr(), mass @ rigid
+    joints = springs_at(parts.jumps, np.tile([along, along, across], parts.law.count))
+    held, carried = (parts.body + joints).tocsr(), mass @ rigid
     phase = np.outer(FACE, np.arange(n_harmonics + 1))
     harmonics = np.hstack([np.cos(phase), np.sin(phase[:, 1:])])
-    loads = np.hstack([*(part @ harmonics for part in lining.tractions(FACE)), parts.jumps.T.toarray()])
+    pairs = [part.T.toarray() for part in (parts.jumps, parts.bolts) if part is not None]
+    loads = np.hstack([*(part @ harmonics for part in lining.tractions(FACE)), *pairs])
     loads = loads / np.abs(loads).max(axis=0)
     loads -= carried @ np.linalg.solve(rigid.T @ carried, rigid.T @ loads)
     # Held at three displacements of two nodes a quarter apart, which takes no force from loads in balance.

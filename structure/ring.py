@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
-from structure.inputs import Input, InputError
+from structure.inputs import Input, InputError, OneOrSeveral
 from structure.plausibility import GROUND, RING, Usual, joints_in_radians
 
 
@@ -56,6 +57,55 @@ class Ground(Input):
     two_way: bool = False
 
 
+#: What may be stated for every joint by its own.
+PER_JOINT = (
+    "joint_rotational_stiffness", "joint_normal_stiffness", "joint_shear_stiffness", "joint_contact_height",
+    "joint_friction_coefficient", "joint_inclinations", "joint_bolts",
+)  # fmt: skip
+#: [degree]
+STEEPEST_JOINT = 45.0
+#: One number for all joints, or one for each.
+NotNegative = OneOrSeveral[Annotated[float, Field(ge=0)]]
+Positive = OneOrSeveral[Annotated[float, Field(gt=0)]]
+
+
+class Bolts(Input):
+    """Straight bolts across a joint, square to it, besides the joint's own springs; they pull and never press.
+
+    Their force per metre of tunnel is max(0, preload + stiffness (elongation - slack)). A preload presses the segments
+    together before any load: the undeformed ring is that before the bolts are tightened.
+
+    Parameters
+    ----------
+    offset : float
+        Where they cross the joint, outward from the centre line [m].
+    length : float
+        Between their anchors [m]. The beams see the bolts in the section of the joint; the continuum anchors them in
+        the concrete.
+    stiffness : float
+        EA/length of all of them [N/m per metre of tunnel]; 0 for a joint without.
+    slack : float
+        Elongation before they begin to pull [m].
+    preload : float
+        Force to which they were tightened [N per metre of tunnel]; without slack.
+    """
+
+    offset: float
+    length: float = Field(gt=0)
+    stiffness: float = Field(ge=0)
+    slack: float = Field(default=0.0, ge=0)
+    preload: float = Field(default=0.0, ge=0)
+
+    @model_validator(mode="after")
+    def _check(self) -> Bolts:
+        if self.slack and self.preload:
+            raise ValueError(
+                f"slack must be 0 where there is a preload of {self.preload:g} N/m, got {self.slack:g} m; bolts that"
+                " are tightened have none"
+            )
+        return self
+
+
 class Ring(Input):
     """A ring of segments, one metre of tunnel.
 
@@ -71,20 +121,32 @@ class Ring(Input):
         [N/m3]; 0 leaves self-weight out.
     joint_angles : tuple of float
         Longitudinal joints [degree] from the crown, clockwise. Empty: a homogeneous ring.
-    joint_rotational_stiffness : float
-        [N m/rad] per metre of tunnel.
-    joint_normal_stiffness, joint_shear_stiffness : float
+    joint_rotational_stiffness : float or tuple of float
+        [N m/rad] per metre of tunnel. This and the four that follow: one number for all joints, or one for each, in
+        the order of `joint_angles`, as for a key segment.
+    joint_normal_stiffness, joint_shear_stiffness : float or tuple of float
         [N/m] per metre of tunnel, that is N/m2: the whole joint, not per area of its face. Spread over the face it is
         k_n/t, so that the face alone would give the rotational stiffness k_n t^2/12.
     joint_contact_only : bool
         Whether the normal spring only presses; a joint with a gap then carries no axial force.
-    joint_contact_height : float, optional
+    joint_contact_height : float or tuple of float, optional
         Height h of the contact zone in the joint [m], at most the thickness. Given, the joint rotates with
         `joint_rotational_stiffness` only while all of h is compressed (|M| up to N h/6) and gapes beyond, |M| staying
         below N h/2 (:func:`structure.joint_laws.contact_moment`). A block of concrete as deep as high has
         k_theta = E h^2/12 (Janssen).
-    joint_friction_coefficient : float, optional
+    joint_friction_coefficient : float or tuple of float, optional
         mu [-]. Given, the joint slides where |Q| would exceed mu N; the slip stays, so records are taken in time order.
+    joint_contact : {"section", "face"}
+        "section": the three springs of a joint act on the mean movement of its faces, limited as above. "face": normal
+        and shear springs are spread over the contact height (all of the thickness where it is left out), and each
+        point of the face only presses, and slides by friction of its own. The rotational stiffness then is
+        k_n h^2/12 and may be left out.
+    joint_inclinations : tuple of float
+        By how much the outer end of every joint leans clockwise from the radius [degree], as beside a key that is
+        pushed in along the radius. Opening, dislocation, N and Q of a joint are square to and along its face; the
+        places of the faces stay radial. Empty: all radial.
+    joint_bolts : Bolts or tuple of Bolts, optional
+        Of all joints, or of each.
     ground : Ground or None
         None: no soil springs; then loads and weight must balance, or `support` must carry the difference.
     balance_uplift : bool
@@ -108,12 +170,15 @@ class Ring(Input):
     concrete_poissons_ratio: float = Field(ge=0, lt=0.5)
     concrete_unit_weight: float = Field(ge=0)
     joint_angles: tuple[float, ...] = ()
-    joint_rotational_stiffness: float = Field(default=0.0, ge=0)
-    joint_normal_stiffness: float = Field(default=0.0, ge=0)
-    joint_shear_stiffness: float = Field(default=0.0, ge=0)
+    joint_rotational_stiffness: NotNegative = 0.0
+    joint_normal_stiffness: NotNegative = 0.0
+    joint_shear_stiffness: NotNegative = 0.0
     joint_contact_only: bool = False
-    joint_contact_height: float | None = Field(default=None, gt=0)
-    joint_friction_coefficient: float | None = Field(default=None, ge=0)
+    joint_contact_height: Positive | None = None
+    joint_friction_coefficient: NotNegative | None = None
+    joint_contact: Literal["section", "face"] = "section"
+    joint_inclinations: tuple[float, ...] = ()
+    joint_bolts: OneOrSeveral[Bolts] | None = None
     ground: Ground | None = None
     balance_uplift: bool = False
     support: Literal["free", "invert"] = "free"
@@ -136,11 +201,7 @@ class Ring(Input):
                 f"joint_angles must increase by at least two elements ({smallest:g} degrees), got {self.joint_angles};"
                 " sort them, or raise n_elements"
             )
-        stiffnesses = {"joint_rotational_stiffness", "joint_normal_stiffness", "joint_shear_stiffness"}
-        missing = sorted(stiffnesses - self.model_fields_set)
-        if self.joint_angles and missing:
-            raise ValueError(f"joints need {', '.join(missing)}, got none; state them, 0 for a free hinge")
-        self._check_joint_laws()
+        self._check_joints()
         if self.support == "invert" and self.ground is not None:
             raise ValueError("support must be 'free' where there is ground, got 'invert'; remove one of the two")
         return self
@@ -150,22 +211,113 @@ class Ring(Input):
         radians = joints_in_radians(self.joint_angles)
         return super().unusual() | ({"joint_angles": radians} if radians else {})
 
-    def _check_joint_laws(self):
-        height = self.joint_contact_height
-        if height is not None and height > self.thickness * (1 + 1e-9):
+    def _check_joints(self):
+        stiffnesses = {"joint_rotational_stiffness", "joint_normal_stiffness", "joint_shear_stiffness"}
+        if self.joint_contact == "face":
+            stiffnesses -= {"joint_rotational_stiffness"}
+        missing = sorted(stiffnesses - self.model_fields_set)
+        if self.joint_angles and missing:
+            raise ValueError(f"joints need {', '.join(missing)}, got none; state them, 0 for a free hinge")
+        count = len(self.joint_angles)
+        for name in PER_JOINT:
+            given = getattr(self, name)
+            if isinstance(given, tuple) and (given or name != "joint_inclinations") and len(given) != count:
+                raise ValueError(
+                    f"{name} must be one for all joints or {count}, one for each, got {len(given)}; give it in the"
+                    " order of joint_angles"
+                )
+        height = 0.0 if self.joint_contact_height is None else self.per_joint("joint_contact_height").max(initial=0.0)
+        if height > self.thickness * (1 + 1e-9):
             raise ValueError(
                 f"joint_contact_height must not exceed the thickness {self.thickness:g} m, got {height:g} m; give the"
                 " height over which the segments touch"
             )
+        steepest = max(map(abs, self.joint_inclinations), default=0.0)
+        if steepest > STEEPEST_JOINT:
+            raise ValueError(
+                f"joint_inclinations must lie within {STEEPEST_JOINT:g} degrees of the radius, got {steepest:g}; the"
+                " joint of a plane ring stands across the segment"
+            )
+        self._check_joint_laws()
+        self._check_bolts()
+
+    def _check_joint_laws(self):
         needs = {"joint_contact_height": ("joint_rotational_stiffness", "joint_normal_stiffness")}
         needs["joint_friction_coefficient"] = ("joint_shear_stiffness", "joint_normal_stiffness")
+        if self.joint_contact == "face":
+            needs["joint_contact_height"] = ("joint_normal_stiffness",)
+            self._check_face()
         for name, stiffnesses in needs.items():
             for stiffness in stiffnesses if getattr(self, name) is not None and self.joint_angles else ():
-                if getattr(self, stiffness) == 0:
+                if (self.per_joint(stiffness) == 0).any():
                     raise ValueError(
                         f"{stiffness} must be above 0 where {name} is given, got 0; this law limits the force of that"
                         f" spring by the axial force in the joint: leave {name} out"
                     )
+
+    def _check_face(self):
+        if not self.joint_angles:
+            raise ValueError("joint_contact must be 'section' where there are no joints, got 'face'; leave it out")
+        normal = self.per_joint("joint_normal_stiffness")
+        if (normal == 0).any():
+            raise ValueError(
+                "joint_normal_stiffness must be above 0 where joint_contact is 'face', got 0; faces that touch press"
+            )
+        turning = self._face_turning
+        given = self.per_joint("joint_rotational_stiffness")
+        if "joint_rotational_stiffness" in self.model_fields_set and (np.abs(given - turning) > 0.01 * turning).any():
+            worst = int(np.argmax(np.abs(given / turning - 1)))
+            raise ValueError(
+                f"joint_rotational_stiffness must be k_n h^2/12 = {turning[worst]:.4g} N m/rad where joint_contact is"
+                f" 'face', got {given[worst]:.4g} at joint {worst + 1}; leave it out, or give the"
+                f" joint_normal_stiffness {12 * given[worst] / self.contact_heights[worst] ** 2:.4g} N/m that turns so"
+            )
+
+    def _check_bolts(self):
+        if self.joint_bolts is None:
+            return
+        if not self.joint_angles:
+            raise ValueError("joint_bolts: the ring must have joints, got none; leave bolts out, or give joint_angles")
+        for bolts in self.bolts:
+            if not abs(bolts.offset) < self.thickness / 2:
+                raise ValueError(
+                    f"joint_bolts: offset must lie within half the thickness {self.thickness / 2:g} m, got"
+                    f" {bolts.offset:g} m; it counts outward from the centre line"
+                )
+
+    def per_joint(self, name: str) -> np.ndarray:
+        """Of every joint, (n_joints,) float64, what "joint_normal_stiffness", say, states for all or for each."""
+        return np.broadcast_to(np.asarray(getattr(self, name), dtype=float), len(self.joint_angles))
+
+    @property
+    def joint_springs(self) -> np.ndarray:
+        """Stiffness against opening [N/m], dislocation [N/m] and rotation [N m/rad] of every joint, (n_joints, 3)."""
+        normal, shear, turning = map(
+            self.per_joint, ("joint_normal_stiffness", "joint_shear_stiffness", "joint_rotational_stiffness")
+        )
+        return np.stack([normal, shear, self._face_turning if self.joint_contact == "face" else turning], axis=1)
+
+    @property
+    def _face_turning(self):
+        return self.per_joint("joint_normal_stiffness") * self.contact_heights**2 / 12
+
+    @property
+    def contact_heights(self) -> np.ndarray:
+        """Height over which the faces of every joint touch, (n_joints,) float64 [m]."""
+        if self.joint_contact_height is None:
+            return np.full(len(self.joint_angles), self.thickness)
+        return self.per_joint("joint_contact_height")
+
+    @property
+    def tilts(self) -> np.ndarray:
+        """By how much the outer end of every joint leans clockwise, (n_joints,) float64 [rad]."""
+        return np.radians(self.joint_inclinations or np.zeros(len(self.joint_angles)))
+
+    @property
+    def bolts(self) -> tuple[Bolts, ...]:
+        """Those of every joint; none where there are no bolts."""
+        given = self.joint_bolts
+        return () if given is None else given if isinstance(given, tuple) else (given,) * len(self.joint_angles)
 
     @property
     def thickness(self) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import sparse
 
 from structure.banded import BandedTangent
-from structure.joint_laws import JointForces, JointLaw
+from structure.joint_laws import BoltLaw, FaceLaw, JointForces, JointLaw
 from structure.ring import Ring
 from structure.springs import soil_reaction, soil_springs
 
@@ -23,10 +23,13 @@ class RingParts(NamedTuple):
 
     segments : (n, n) sparse
         Stiffness of the segments, symmetric.
-    linear_joints : (n, n) sparse or None
-        That of joints whose law is linear, as far as they are springs.
+    uneven : (n, n) sparse or None
+        What joints store in a gap beyond their jumps, linear under any law; none where faces are plane.
     jumps : (3 n_joints, n) sparse
         Opening, dislocation and rotation of every joint.
+    law : JointLaw or FaceLaw
+    faces : (2 n_points, n) sparse or None
+        Gap and slide at every point of a :class:`structure.joint_laws.FaceLaw`.
     feel, area : (n_springs, n) sparse, (n_springs,) float64
         What the soil springs feel, first all normal ones [m], outward, then as many tangential ones, clockwise; and
         the area that each reaction [Pa] acts on [m2/m].
@@ -47,12 +50,16 @@ class RingParts(NamedTuple):
         Mean movement of the ring to the right, up and clockwise.
     arm : (n,) float64
         1 for displacements, the radius of the centre line for rotations [m].
-    ties, tie_stiffness : (n_ties, n) sparse or None, float
-        As of :class:`structure.banded.BandedTangent`.
+    bolts, bolt_law : (n_joints, n) sparse, BoltLaw, or None
+        Elongation of the bolts of every joint.
+    bolts_reach : bool
+        Whether they join places far apart, which would widen the band.
+    strips : bool
+        Whether the joints are soft material, part of the segments.
     """
 
     segments: sparse.csr_array
-    linear_joints: sparse.csr_array | None
+    uneven: sparse.csr_array | None
     jumps: sparse.csr_array
     feel: sparse.csr_array
     area: np.ndarray
@@ -65,8 +72,27 @@ class RingParts(NamedTuple):
     rigid: np.ndarray
     mean: np.ndarray
     arm: np.ndarray
-    ties: sparse.csr_array | None = None
-    tie_stiffness: float = 0.0
+    law: JointLaw | FaceLaw
+    faces: sparse.csr_array | None = None
+    bolts: sparse.csr_array | None = None
+    bolt_law: BoltLaw | None = None
+    bolts_reach: bool = False
+    strips: bool = False
+
+    @property
+    def moves(self) -> sparse.csr_array:
+        """What the joints' law takes of the unknowns, (law.moves law.count, n)."""
+        return self.jumps if self.faces is None else self.faces
+
+    @property
+    def body(self) -> sparse.csr_array:
+        """Stiffness of all but joints and bolts, (n, n)."""
+        return self.segments if self.uneven is None else (self.segments + self.uneven).tocsr()
+
+    @property
+    def linear(self) -> sparse.csr_array:
+        """Stiffness of all but bolts while nothing limits the joints, (n, n)."""
+        return self.body if self.strips else (self.body + springs_at(self.moves, self.law.springs)).tocsr()
 
 
 def whole_movements(size: int, nodes: np.ndarray, angle: np.ndarray, lever: np.ndarray | float) -> np.ndarray:
@@ -79,17 +105,28 @@ def whole_movements(size: int, nodes: np.ndarray, angle: np.ndarray, lever: np.n
     return moved
 
 
-def springs_at_joints(jumps: sparse.csr_array, springs: tuple[float, float, float]) -> sparse.csr_array:
-    """Stiffness (n, n) of springs against opening, dislocation and rotation of every joint; jumps : (3 n_joints, n)."""
-    return (jumps.T @ sparse.diags_array(np.tile(springs, jumps.shape[0] // 3)) @ jumps).tocsr()
+def springs_at(rows: sparse.csr_array, springs: np.ndarray) -> sparse.csr_array:
+    """Stiffness (n, n) of springs (n_rows in any shape) against what rows (n_rows, n) give of the unknowns."""
+    return (rows.T @ sparse.diags_array(np.ravel(springs)) @ rows).tocsr()
 
 
-def uneven_gaps(ring: Ring, parts: RingParts) -> sparse.csr_array:
-    """What joints store in a gap beyond their jumps, (n, n): linear under any law; nothing where faces are plane."""
-    if parts.linear_joints is None:
-        return sparse.csr_array(parts.segments.shape)
-    springs = ring.joint_normal_stiffness, ring.joint_shear_stiffness, ring.joint_rotational_stiffness
-    return (parts.linear_joints - springs_at_joints(parts.jumps, springs)).tocsr()
+def tilted(rows: sparse.csr_array, tilts: np.ndarray) -> sparse.csr_array:
+    """Openings and dislocations square to and along faces that lean, from those of radial faces.
+
+    Parameters
+    ----------
+    rows : (k n, n_unknowns) sparse
+        Opening, dislocation and what else moves, k at each of n places.
+    tilts : (n,) float64
+        By how much the outer end of the face leans clockwise [rad].
+    """
+    if not np.any(tilts):
+        return rows
+    ways = rows.shape[0] // len(tilts)
+    turned = np.tile(np.eye(ways), (len(tilts), 1, 1))
+    turned[:, 0, 0] = turned[:, 1, 1] = np.cos(tilts)
+    turned[:, 0, 1], turned[:, 1, 0] = np.sin(tilts), -np.sin(tilts)
+    return (sparse.block_diag(turned) @ rows).tocsr()
 
 
 class RingForces:
@@ -97,36 +134,40 @@ class RingForces:
 
     Attributes
     ----------
-    joints : JointLaw
+    joints : JointLaw or FaceLaw
         Linear joints are part of the constant stiffness, others join in at every iteration.
-    unslipped : (n_joints,) float64
-        Slips of joints that never slid.
+    unslipped : (joints.count,) float64
+        Slips of joints, or of points of their faces, that never slid.
     """
 
     def __init__(self, ring: Ring, parts: RingParts):
         self.ring, self.parts, self.held = ring, parts, parts.held
         self.springs = soil_springs(ring) if ring.ground is not None else None
-        self.joints = JointLaw(ring)
-        self.unslipped = np.zeros(len(ring.joint_angles))
-        linear = parts.segments if parts.linear_joints is None else (parts.segments + parts.linear_joints).tocsr()
-        constant = linear if self.joints.linear else parts.segments + uneven_gaps(ring, parts)
-        if parts.ties is None:
-            bolts = sparse.csr_array(linear.shape)
-        else:
-            bolts = parts.tie_stiffness * (parts.ties.T @ parts.ties)
-        self.stiffness, self.magnitudes = (constant + bolts).tocsr(), abs(linear + bolts).tocsr()
-        self._push, self._force = parts.feel.T.tocsr(), parts.jumps.T.tocsr()
-        rows, pairs = [], []
+        self.joints = parts.law
+        self.unslipped = np.zeros(parts.law.count)
+        linear = parts.linear
+        constant = linear if self.joints.linear else parts.body
+        bolts = None if parts.bolts is None else springs_at(parts.bolts, parts.bolt_law.stiffness)
+        self.stiffness = constant
+        self.magnitudes = abs(linear if bolts is None else linear + bolts).tocsr()
+        self._push, self._force = parts.feel.T.tocsr(), parts.moves.T.tocsr()
+        rows, pairs = [sparse.csr_array((0, linear.shape[0]))], [np.zeros((0, 2), dtype=int)]
+
+        def let_change(more, within):
+            pairs.append(sum(part.shape[0] for part in rows) + within)
+            rows.append(more)
+
         if self.springs is not None:
-            rows, pairs = [parts.feel], [np.repeat(np.arange(len(parts.area))[:, None], 2, axis=1)]
+            let_change(parts.feel, np.repeat(np.arange(len(parts.area))[:, None], 2, axis=1))
         if not self.joints.linear:
-            first = sum(part.shape[0] for part in rows) + 3 * np.arange(len(self.unslipped))
-            of_joint = np.stack(np.divmod(np.arange(9), 3), axis=1)
-            rows, pairs = [*rows, parts.jumps], [*pairs, (first[:, None, None] + of_joint).reshape(-1, 2)]
-        stacked = sparse.vstack(rows) if rows else sparse.csr_array((0, parts.segments.shape[0]))
-        pairs = np.concatenate(pairs) if pairs else np.zeros((0, 2), dtype=int)
+            ways = self.joints.moves
+            first, of_joint = ways * np.arange(self.joints.count), np.stack(np.divmod(np.arange(ways**2), ways), axis=1)
+            let_change(parts.moves, (first[:, None, None] + of_joint).reshape(-1, 2))
+        if bolts is not None and not parts.bolts_reach:
+            let_change(parts.bolts, np.repeat(np.arange(parts.bolts.shape[0])[:, None], 2, axis=1))
+        symmetric, ties = self.joints.linear, parts.bolts if parts.bolts_reach else None
         self.tangent = BandedTangent(
-            constant, stacked, pairs, parts.place, parts.held, self.joints.linear, parts.ties, parts.tie_stiffness
+            constant, sparse.vstack(rows), np.concatenate(pairs), parts.place, parts.held, symmetric, ties
         )
 
     def reactions(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -146,25 +187,40 @@ class RingForces:
         """Opening, dislocation and rotation of the joints (..., n_joints, 3) at displacements (..., n)."""
         return (self.parts.jumps @ displacement.T).T.reshape(*displacement.shape[:-1], -1, 3)
 
+    def moved(self, displacement: np.ndarray) -> np.ndarray:
+        """What the joints' law takes (..., law.count, law.moves) of displacements (..., n)."""
+        return (self.parts.moves @ displacement.T).T.reshape(*displacement.shape[:-1], -1, self.joints.moves)
+
     def joint_forces(self, displacement: np.ndarray, slip: np.ndarray) -> JointForces:
-        """Forces in the joints at displacements (..., n) reached from slips (..., n_joints)."""
-        return self.joints.forces(self.jumps(displacement), slip)
+        """Forces in the joints, or at points of their faces, at displacements (..., n) reached from slips."""
+        return self.joints.forces(self.moved(displacement), slip)
+
+    def bolt_forces(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Pull of the bolts of every joint [N/m] and its tangent [N/m2], (..., n_joints); none without bolts."""
+        if self.parts.bolts is None:
+            return np.zeros(0), np.zeros(0)
+        return self.parts.bolt_law.pull((self.parts.bolts @ displacement.T).T)
 
     def internal_forces(self, displacement: np.ndarray, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Forces that hold segments and joints deformed (n,), and the tangents of joints that are not linear."""
-        forces = self.stiffness @ displacement
-        if self.joints.linear:
-            return forces, np.zeros(0)
-        axial, shear, moment, tangent, _ = self.joint_forces(displacement, slip)
-        return forces + self._force @ np.stack([-axial, shear, moment], axis=-1).ravel(), tangent.ravel()
+        """Forces that hold segments, joints and bolts deformed (n,), and the tangents of what is not linear."""
+        forces, tangents = self.stiffness @ displacement, []
+        if not self.joints.linear:
+            of_joints = self.joint_forces(displacement, slip)
+            forces = forces + self._force @ of_joints.resisting.ravel()
+            tangents.append(of_joints.tangent.ravel())
+        if self.parts.bolts is not None:
+            pull, stiffening = self.bolt_forces(displacement)
+            forces = forces + self.parts.bolts.T @ pull
+            tangents.append(stiffening)
+        return forces, np.concatenate(tangents or [np.zeros(0)])
 
     def residual(self, displacement: np.ndarray, loads: np.ndarray, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Out-of-balance forces, zero where held, and the coefficients of the tangent."""
         reactions, stiffening = self.reactions(displacement)
-        internal, of_joints = self.internal_forces(displacement, slip)
+        internal, inside = self.internal_forces(displacement, slip)
         out_of_balance = loads + self.spring_forces(reactions) - internal
         out_of_balance[self.held] = 0
-        return out_of_balance, np.concatenate([self.parts.area[: len(stiffening)] * stiffening, of_joints])
+        return out_of_balance, np.concatenate([self.parts.area[: len(stiffening)] * stiffening, inside])
 
     def sizes(self, vectors: np.ndarray) -> np.ndarray:
         """Sizes at the nodes (..., n_nodes) of forces or displacements (..., n)."""
@@ -175,33 +231,37 @@ class RingForces:
         angle = np.degrees(self.parts.node_angle[node]) % 360
         for joint, at in enumerate(self.ring.joint_angles):
             if abs((angle - at + 180) % 360 - 180) < 1e-9:
-                return f"at joint {joint + 1} ({at:g} degrees)"
+                return f"at {self.joint_words(joint)}"
         return f"at {angle:.4g} degrees"
 
     def loose_place(self, motion: np.ndarray) -> str:
         """What is said of a mechanism."""
-        if not len(self.unslipped):
+        if not self.joints.count:
             return "rounding hides the stiffness of the ring: it is too thin for this mesh to hold without more ground"
-        aside = "" if self.parts.ties is None else " (its bolts left aside)"
+        aside = " (its bolts left aside)" if self.parts.bolts_reach else ""
         weak = "joints too weak to hold it without more ground"
         return f"the ring is a mechanism{aside}: {weak}{self.freest_joint(motion)}"
 
     def freest_joint(self, motion: np.ndarray) -> str:
         """Which joint moves most in a motion and how, for the message of a failure."""
-        if not len(self.unslipped) or not np.isfinite(motion).all():
+        if not self.joints.count or not np.isfinite(motion).all():
             return ""
         jumps = np.abs(self.jumps(motion)) * [1, 1, self.ring.centre_radius]
         joint, way = np.unravel_index(int(jumps.argmax()), jumps.shape)
         if jumps[joint, way] < 1e-3 * np.abs(motion).max():
             return "; it moves as a whole"
         verb = ("opens or closes", "slides", "turns")[way]
-        return f"; joint {joint + 1} ({self.ring.joint_angles[joint]:g} degrees) {verb} most freely"
+        return f"; {self.joint_words(int(joint))} {verb} most freely"
+
+    def joint_words(self, joint: int) -> str:
+        """Number and place of a joint."""
+        return f"joint {joint + 1} ({self.ring.joint_angles[joint]:g} degrees)"
 
     def conditions(self, displacement: np.ndarray, slip: np.ndarray) -> str:
         """Joints that are not closed and how much of the ring the ground presses on, for the message of a failure."""
         words = ""
         if not self.joints.linear:
-            states = self.joints.states(self.jumps(displacement), self.joint_forces(displacement, slip))
+            states = self.joints.states(self.moved(displacement), self.joint_forces(displacement, slip))
             loose = [f"joint {k + 1} is {state}" for k, state in enumerate(states) if state != "closed"]
             words += "; " + (", ".join(loose) or "all joints are closed")
         if self.springs is not None and not self.springs[0].pulls:

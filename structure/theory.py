@@ -13,6 +13,8 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
+    from structure.ring import Ring
+
 
 def theoretical_pressures(
     *,
@@ -106,23 +108,16 @@ def _refuse_water_table(cover, water_table_depth, unit_weight_above_water):
         )
 
 
-def curved_section_moment(
-    axial_force: np.ndarray,
-    thickness: float,
-    radius: float,
-    bending_stiffness: float,
-    n_joints: int = 0,
-    rotational_stiffness: float = np.inf,
-) -> np.ndarray:
+def curved_section_moment(axial_force: np.ndarray, ring: Ring) -> np.ndarray:
     """Moment [N m/m] by which a thick ring exceeds one of straight beams: N t^2/(12 R), less what joints release.
 
     The inner fibres of a curved section are shorter, so thrust on the centre line turns it as a moment -N t^2/(12 R)
-    would. In a closed ring those rotations, and those of n joints, must add up to zero, which takes a uniform moment
-    of N t^2/(12 R)/(1 + n EI/(2 pi R k)). Exact for a uniform N in a thin ring (Winkler's curved beam, first order).
+    would. In a closed ring those rotations, and those of joints of stiffness k, must add up to zero, which takes a
+    uniform moment of N t^2/(12 R)/(1 + sum(1/k) EI/(2 pi R)). Exact for a uniform N in a thin ring (Winkler's curved
+    beam, first order).
     """
-    offset = axial_force * thickness**2 / (12 * radius)
-    if n_joints == 0:
-        return offset
-    if rotational_stiffness == 0:
+    radius, turning = ring.centre_radius, ring.joint_springs[:, 2]
+    offset = axial_force * ring.thickness**2 / (12 * radius)
+    if np.any(turning == 0):
         return 0 * offset
-    return offset / (1 + n_joints * bending_stiffness / (2 * np.pi * radius * rotational_stiffness))
+    return offset / (1 + np.sum(1 / turning) * ring.bending_stiffness / (2 * np.pi * radius))

@@ -111,18 +111,12 @@ def _differences(first, second, ring):
         fields[name] = (second[name] - first[name]).assign_attrs(
             units=meaning["units"], long_name=f"difference of the {meaning['long_name']}"
         )
+    turning = ring.joint_springs[:, 2]
     for name, axial in OFFSETS.items():
-        offset = curved_section_moment(
-            first[axial],
-            ring.thickness,
-            ring.centre_radius,
-            ring.bending_stiffness,
-            len(ring.joint_angles),
-            ring.joint_rotational_stiffness,
-        )
+        offset = curved_section_moment(first[axial], ring)
         if name == "joint_rotation":
-            stiffness = ring.joint_rotational_stiffness
-            offset = offset / stiffness if stiffness else offset * 0
+            shares = np.divide(1.0, turning, out=np.zeros(len(turning)), where=turning > 0)
+            offset = offset * xr.DataArray(shares, dims="joint")
         sign = 1 if second.attrs.get("model") == "continuum" else -1
         fields[f"{name}_beyond_offset"] = (fields[name] - sign * offset).assign_attrs(
             units=fields[name].attrs["units"],

@@ -91,12 +91,19 @@ def facts(scene: Scene) -> list[tuple[str, str]]:
         thick = f"thickness {1e3 * ring.thickness:g} mm"
         tell("ring", f"{len(ring.joint_angles)} joints, {thick}, concrete E {ring.concrete_modulus / 1e9:g} GPa")
         if ring.joint_angles:
-            normal, shear = ring.joint_normal_stiffness / 1e6, ring.joint_shear_stiffness / 1e6
-            turn = f"rotation {ring.joint_rotational_stiffness / 1e6:g} MN m/rad"
-            tell("joints", f"{turn}, normal {normal:g} MN/m, shear {shear:g} MN/m, a metre")
+            normal, shear, turn = map(_from_to, ring.joint_springs.T / 1e6)
+            tell("joints", f"rotation {turn} MN m/rad, normal {normal} MN/m, shear {shear} MN/m, a metre")
+        if ring.bolts:
+            stiffness = _from_to([bolts.stiffness / 1e6 for bolts in ring.bolts])
+            tell("bolts", f"{stiffness} MN/m, a metre")
     if scene.limits is not None:
         tell("limits", scene.limits.in_words)
     return rows
+
+
+def _from_to(values):
+    low, high = min(values), max(values)
+    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
 
 
 def initial_k0(scene: MpmScene) -> list[dict[str, Any]]:

@@ -138,9 +138,11 @@ def hints(data: dict[str, Any]) -> dict[tuple[Any, ...], str]:
             path = (*name.split("."), *(() if index is None else (index,)))
             for key, (low, high, unit, others) in usual.items():
                 value = entry.get(key) if isinstance(entry, dict) else None
-                hint = unusual(value, low, high, unit, others)
-                if hint:
-                    found[*path, key] = hint
+                several = isinstance(value, list | tuple)
+                for k, number in enumerate(value if several else (value,)):
+                    hint = unusual(number, low, high, unit, others)
+                    if hint:
+                        found[(*path, key, k) if several else (*path, key)] = hint
     found |= _angles_in_radians(data)
     return found
 

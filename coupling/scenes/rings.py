@@ -22,13 +22,15 @@ if TYPE_CHECKING:
 UNITS = {
     f"{table}.{name}": unit
     for (table, unit), names in {
-        ("ring", "m"): "outer_diameter inner_diameter joint_contact_height",
-        ("ring", "degree"): "joint_angles ground.friction_angle",
+        ("ring", "m"): "outer_diameter inner_diameter joint_contact_height joint_bolts.offset "
+        "joint_bolts.length joint_bolts.slack",
+        ("ring", "degree"): "joint_angles joint_inclinations ground.friction_angle",
         ("ring", "Pa"): "concrete_modulus ground.youngs_modulus ground.cohesion ground.vertical_stress "
         "ground.horizontal_stress ground.limit_pressure_normal ground.limit_pressure_tangential",
         ("ring", "N/m**3"): "concrete_unit_weight",
         ("ring", "N*m/rad/m"): "joint_rotational_stiffness",
-        ("ring", "N/m/m"): "joint_normal_stiffness joint_shear_stiffness",
+        ("ring", "N/m/m"): "joint_normal_stiffness joint_shear_stiffness joint_bolts.stiffness",
+        ("ring", "N/m"): "joint_bolts.preload",
         ("limits", "m"): "gasket_opening gasket_offset joint_dislocation joint_contact_height crack_width "
         "capacity.minimum_eccentricity segment.cover_outer segment.cover_inner segment.bar_diameter_outer "
         "segment.bar_diameter_inner segment.bar_spacing_outer segment.bar_spacing_inner",
@@ -45,6 +47,10 @@ def in_si(data: dict[str, Any], table: str) -> tuple[dict[str, Any], list[Mistak
         if isinstance(value, dict):
             numbers[key], more = in_si(value, name)
             wrong += more
+        elif isinstance(value, list | tuple) and value and all(isinstance(entry, dict) for entry in value):
+            found = [in_si(entry, name) for entry in value]
+            numbers[key] = [entry for entry, _ in found]
+            wrong += [mistake for _, more in found for mistake in more]
         elif name in UNITS:
             try:
                 several = isinstance(value, list | tuple)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from scipy import sparse
 
@@ -16,9 +18,10 @@ from structure.beams.elements import (
 )
 from structure.beams.mesh import RingMesh, displacements_at, forces_at
 from structure.discrete import SIDES, DiscreteLining, Readings
+from structure.joint_laws import FACE_POINTS, BoltLaw, FaceLaw, FacePoints, JointLaw
 from structure.lining import THETA
 from structure.ring import Ring, check_ring
-from structure.ring_forces import RingParts, springs_at_joints, whole_movements
+from structure.ring_forces import RingParts, tilted, whole_movements
 
 
 class BeamSpringLining(DiscreteLining):
@@ -54,8 +57,7 @@ def _parts(ring: Ring, mesh: RingMesh) -> RingParts:
     rigid = whole.copy()
     rigid[2, 2::3] = 1 / ring.centre_radius
     invert = int(np.argmin(np.abs(mesh.node_angle % (2 * np.pi) - np.pi)))
-    jumps = joint_jumps(mesh)
-    stiffness = ring.joint_normal_stiffness, ring.joint_shear_stiffness, ring.joint_rotational_stiffness
+    jumps = tilted(joint_jumps(mesh), ring.tilts)
     # Tangential springs on the outer face also feel the rotation.
     on_face = ring.ground is not None and ring.ground.slip_at == "outer_face"
     lever = np.full(mesh.n_nodes, ring.thickness / 2 if on_face else 0.0)
@@ -63,8 +65,9 @@ def _parts(ring: Ring, mesh: RingMesh) -> RingParts:
     values = np.concatenate([np.ones(2 * mesh.n_nodes), lever])
     return RingParts(
         segments=segment_stiffness(ring, mesh),
-        linear_joints=springs_at_joints(jumps, stiffness),
+        uneven=None,
         jumps=jumps,
+        **_joints(ring, jumps),
         feel=sparse.coo_array((values, place), shape=(2 * mesh.n_nodes, size)).tocsr(),
         area=np.tile(ring.outer_radius * mesh.node_span, 2),
         weight=self_weight(ring, mesh),
@@ -77,6 +80,24 @@ def _parts(ring: Ring, mesh: RingMesh) -> RingParts:
         mean=whole * np.repeat(mesh.node_span / (2 * np.pi), 3),
         arm=np.tile([1.0, 1.0, ring.centre_radius], mesh.n_nodes),
     )
+
+
+def _joints(ring: Ring, jumps: sparse.csr_array) -> dict[str, Any]:
+    """Laws of joints and bolts, with what they take of the unknowns: plane sections stay plane."""
+    found: dict[str, Any] = {"law": JointLaw(ring)}
+    count = len(ring.joint_angles)
+    if ring.joint_contact == "face":
+        joint = np.repeat(np.arange(count), FACE_POINTS)
+        place = (np.arange(FACE_POINTS) + 0.5) / FACE_POINTS - 0.5
+        lever = np.outer(ring.contact_heights, place).ravel()
+        points = FacePoints(joint, lever, ring.contact_heights[joint] / FACE_POINTS)
+        gap = jumps[3 * joint] + sparse.diags_array(lever) @ jumps[3 * joint + 2]
+        in_turn = np.arange(2 * len(joint)).reshape(2, -1).T.ravel()
+        found |= {"law": FaceLaw(ring, points), "faces": sparse.vstack([gap, jumps[3 * joint + 1]]).tocsr()[in_turn]}
+    if ring.bolts:
+        offset = sparse.diags_array(np.array([bolts.offset for bolts in ring.bolts]))
+        found |= {"bolts": (jumps[::3] + offset @ jumps[2::3]).tocsr(), "bolt_law": BoltLaw(ring)}
+    return found
 
 
 def _readings(ring: Ring, mesh: RingMesh) -> Readings:

@@ -138,8 +138,9 @@ def _moduli(ring: Ring, strip: np.ndarray, strip_width: float) -> tuple[np.ndarr
     shear = young / (2 * (1 + nu))
     coupling = young * nu / ((1 + nu) * (1 - 2 * nu))
     direct = coupling + 2 * shear
-    hoop_strip = 12 * ring.joint_rotational_stiffness * strip_width / ring.thickness**3
-    shear_strip = ring.joint_shear_stiffness * strip_width / ring.thickness
+    _, shearing, turning = ring.joint_springs[0] if strip.any() else np.zeros(3)
+    hoop_strip = 12 * turning * strip_width / ring.thickness**3
+    shear_strip = shearing * strip_width / ring.thickness
     return (
         np.full(len(strip), direct),
         np.where(strip, 0.0, coupling),

@@ -1,4 +1,4 @@
-"""Zero-thickness joints of a continuum ring: how their faces move against each other, and their stiffness."""
+"""Zero-thickness joints of a continuum ring: how their faces move against each other, as wholes and at points."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import numpy as np
 from scipy import sparse
 
 from structure.continuum.mesh import ContinuumMesh
+from structure.continuum.sections import edge_shapes
+from structure.joint_laws import FACE_POINTS, FacePoints
 from structure.ring import Ring
 
 #: Integrals of products of the three shape functions of a quadratic edge of unit length.
@@ -68,27 +70,56 @@ def joint_jumps(ring: Ring, mesh: ContinuumMesh) -> sparse.csr_array:
     return sparse.vstack([opening, dislocation, rotation]).tocsr()[by_joint]
 
 
-def joint_stiffness(ring: Ring, mesh: ContinuumMesh) -> sparse.csr_array:
-    """Stiffness of zero-thickness joints, (n_unknowns, n_unknowns).
+def uneven_stiffness(ring: Ring, mesh: ContinuumMesh) -> sparse.csr_array:
+    """What the springs of zero-thickness joints store in a gap beyond its jumps, (n_unknowns, n_unknowns).
 
-    Springs k_n and k_s per height of what touches alone would turn with k_n t^2/12. Rank-1 terms in the gap on the
-    centre line and in the rotation bring the rest, so that the energy is k_n opening^2 + k_theta rotation^2 plus what
-    the springs store in the rest of the gap; it is never negative. Without a groove only the rotation needs one,
-    k_theta - k_n t^2/12.
+    Springs k_n and k_s per height of what touches, less what they store in opening, rotation and mean dislocation,
+    where the joint's own law acts. Never negative.
     """
     n_unknowns = 2 * mesh.n_lines * mesh.n_levels
     mass = _face_mass(mesh)
     fit, matrix = _best_fit(ring, mesh)
-    touching = matrix[0, 0]
-    normal = ring.joint_normal_stiffness / touching * (mass - fit.T @ matrix @ fit) + fit.T @ (
-        np.diag([ring.joint_normal_stiffness, ring.joint_rotational_stiffness]) @ fit
-    )
+    touching, mean = matrix[0, 0], mass.sum(0)
+    rest = (mass - fit.T @ matrix @ fit) / touching, mass / touching - np.outer(mean, mean) / touching**2
     stiffness = sparse.csr_array((n_unknowns, n_unknowns))
-    for direction, face in ((1, normal), (0, ring.joint_shear_stiffness / touching * mass)):
+    for direction, face, springs in zip((1, 0), rest, ring.joint_springs.T, strict=False):
         jumps = sparse.vstack([_face_jump(mesh, row, direction) for row in np.eye(mesh.n_levels)]).tocsr()
-        spread = sparse.kron(face, sparse.eye_array(len(mesh.joint_before)))
-        stiffness = stiffness + jumps.T @ spread @ jumps
+        stiffness = stiffness + jumps.T @ sparse.kron(face, sparse.diags_array(springs)) @ jumps
     return stiffness.tocsr()
+
+
+def face_points(ring: Ring, mesh: ContinuumMesh) -> tuple[FacePoints, sparse.csr_array]:
+    """Points where the faces of joints touch, evenly over the contact height, and their gaps and slides from the nodes.
+
+    Returns
+    -------
+    points : FacePoints
+    faces : (2 n_points, n_unknowns) sparse
+    """
+    joint, lever, length, first, shapes = [], [], [], [], []
+    edges = mesh.radius[::2] - ring.centre_radius
+    for k, height in enumerate(ring.contact_heights):
+        for layer in np.flatnonzero(~mesh.groove_layers):
+            low, high = max(edges[layer], -height / 2), min(edges[layer + 1], height / 2)
+            if high <= low:
+                continue
+            count = max(2, round(FACE_POINTS * (high - low) / height))
+            at = low + (high - low) * (np.arange(count) + 0.5) / count
+            joint.append(np.full(count, k))
+            lever.append(at)
+            length.append(np.full(count, (high - low) / count))
+            first.append(np.full(count, 2 * layer))
+            shapes.append(edge_shapes((at - edges[layer]) / mesh.layer_height[layer]))
+    joint, lever, length, first, shapes = map(np.concatenate, (joint, lever, length, first, shapes))
+    level = first[:, None] + np.arange(3)
+    faces = sparse.csr_array((2 * len(joint), 2 * mesh.n_lines * mesh.n_levels))
+    for lines, sign in ((mesh.joint_after, 1.0), (mesh.joint_before, -1.0)):
+        node = lines[joint][:, None] * mesh.n_levels + level
+        for row, way, turn in ((0, 1, 1.0), (1, 0, -1.0)):  # clockwise apart opens, outward apart slides back
+            rows = np.repeat(2 * np.arange(len(joint)) + row, 3)
+            entries = (sign * turn * shapes).ravel()
+            faces = faces + sparse.coo_array((entries, (rows, (2 * node + way).ravel())), shape=faces.shape)
+    return FacePoints(joint, lever, length), faces.tocsr()
 
 
 def _face_jump(mesh: ContinuumMesh, weights: np.ndarray, direction: int, before: float = -1.0) -> sparse.csr_array:

@@ -9,18 +9,19 @@ import xarray as xr
 from scipy import sparse
 
 from structure.banded import folded
-from structure.continuum.bolts import Bolts, anchor_place, bolt_elongation, bolt_shares, check_bolts, near_anchors
+from structure.continuum.bolts import anchor_places, bolt_elongation, bolt_shares, check_anchors, near_anchors
 from structure.continuum.concrete import Concrete
 from structure.continuum.face import spring_feelers, traction_operator
-from structure.continuum.joints import joint_jumps, joint_stiffness, nodes_from_unknowns
+from structure.continuum.joints import face_points, joint_jumps, nodes_from_unknowns, uneven_stiffness
 from structure.continuum.mesh import EDGE_MEAN, ContinuumMesh, GasketGroove, Gate
 from structure.continuum.sections import section_displacements, section_forces
 from structure.discrete import SIDES, DiscreteLining, Readings, States, one_thread
+from structure.joint_laws import BoltLaw, FaceLaw, JointLaw
 from structure.lining import THETA, origin
 from structure.pressures import check_pressures
 from structure.response import FORCES
 from structure.ring import Ring, check_ring
-from structure.ring_forces import RingParts, whole_movements
+from structure.ring_forces import RingParts, tilted, whole_movements
 
 #: Name: (dimensions, units, long name) of the stress dataset.
 STRESSES = {
@@ -28,8 +29,6 @@ STRESSES = {
     "stress_tt": ("Pa", "hoop stress in the lining, tension positive"),
     "stress_rt": ("Pa", "shear stress in the lining, positive where it turns a radius clockwise outside"),
 }
-#: Units and long name of the one variable beyond the schema of all models.
-BOLT_FORCE = {"units": "N/m", "long_name": "force in the bolts of a joint per metre of tunnel, tension positive"}
 
 
 class ContinuumLining(DiscreteLining):
@@ -38,7 +37,8 @@ class ContinuumLining(DiscreteLining):
     Parameters
     ----------
     ring : Ring
-        Its ``n_elements`` means nothing here. The concrete always deforms in shear, so section="euler-bernoulli" is
+        Its ``n_elements`` means nothing here. Bolts join their anchors inside the concrete; N, Q and M of sections and
+        joints contain what they carry. The concrete always deforms in shear, so section="euler-bernoulli" is
         refused.
     columns : int
         Elements around the ring.
@@ -56,10 +56,6 @@ class ContinuumLining(DiscreteLining):
     groove : GasketGroove or tuple of float, optional
         Cover, height and depth [m] of the gasket's groove in both faces of every joint. The segments touch above and
         below it; the three stiffnesses of the joint stay those of the ring, the concrete beside it gets softer.
-    bolts : Bolts or tuple of float, optional
-        Offset, length [m] and stiffness [N/m per m] of bolts across every joint, besides its own springs. N, Q and M of
-        sections and joints contain what the bolts carry; the response has ``joint_bolt_force``. They are elastic and
-        two-way.
 
     Notes
     -----
@@ -80,23 +76,21 @@ class ContinuumLining(DiscreteLining):
         strip_width: float = 0.02,
         gate: Gate | tuple[float, float] | None = None,
         groove: GasketGroove | tuple[float, float, float] | None = None,
-        bolts: Bolts | tuple[float, float, float] | None = None,
     ):
         gate = None if gate is None else Gate(*gate)
         groove = None if groove is None else GasketGroove(*groove)
-        bolts = None if bolts is None else Bolts(*bolts)
         check_ring(ring)
         _refuse_unsupported(ring, joint)
         _refuse_options(ring, columns, layers, joint, strip_width, gate)
         if groove is not None:
             _check_groove(ring, joint, groove)
-        if bolts is not None:
-            check_bolts(ring, bolts)
-        self.joint, self.gate, self.groove, self.bolts = joint, gate, groove, bolts
+        if ring.bolts:
+            check_anchors(ring)
+        self.joint, self.gate, self.groove = joint, gate, groove
         self._width = width = strip_width if joint == "equivalent_strip" else 0.0
         # A strip's faces stand apart, so its anchors meet no line offset from them.
-        anchor = anchor_place(ring, bolts)[0] if bolts is not None and width == 0 else None
-        self.mesh = ContinuumMesh(ring, columns, layers, width, gate, groove, anchor)
+        anchors = tuple(np.unique(anchor_places(ring)[0])) if ring.bolts and width == 0 else ()
+        self.mesh = ContinuumMesh(ring, columns, layers, width, gate, groove, anchors)
         self._concrete = Concrete(ring, self.mesh, width)
         self._stress = self._concrete.stresses()
         #: Node displacements from the unknowns solved for; jumps across joints are unknowns themselves.
@@ -153,7 +147,7 @@ class ContinuumLining(DiscreteLining):
 
     def _parts(self, ring):
         mesh, concrete, to_nodes = self.mesh, self._concrete, self._to_nodes
-        zero_thickness = self._width == 0 and len(mesh.joint_before) > 0
+        uneven = self._width == 0 and len(mesh.joint_before) > 0 and ring.joint_contact == "section"
         size, first = len(mesh.node_angle), 2 * mesh.n_levels
         nodes = 2 * np.arange(size)[:, None] + np.arange(2)
         whole = whole_movements(2 * size, nodes, mesh.node_angle, 1.0)
@@ -162,11 +156,10 @@ class ContinuumLining(DiscreteLining):
         #: the unknowns before it.
         own = np.asarray(to_nodes.sum(axis=1) == 1)
         feel, area = spring_feelers(ring, mesh)
-        bolts = self.bolts
         return RingParts(
             segments=(to_nodes.T @ concrete.stiffness() @ to_nodes).tocsr(),
-            linear_joints=(to_nodes.T @ joint_stiffness(ring, mesh) @ to_nodes).tocsr() if zero_thickness else None,
-            jumps=(joint_jumps(ring, mesh) @ to_nodes).tocsr(),
+            uneven=(to_nodes.T @ uneven_stiffness(ring, mesh) @ to_nodes).tocsr() if uneven else None,
+            jumps=tilted(_without_zeros(joint_jumps(ring, mesh) @ to_nodes), ring.tilts),
             feel=(feel @ to_nodes).tocsr(),
             area=area,
             weight=to_nodes.T @ concrete.body_force(),
@@ -178,9 +171,24 @@ class ContinuumLining(DiscreteLining):
             rigid=rigid * own,
             mean=(whole * np.repeat(self._node_share(), 2)) @ to_nodes,
             arm=np.ones(2 * size),
-            ties=None if bolts is None else (bolt_elongation(ring, mesh, bolts) @ to_nodes).tocsr(),
-            tie_stiffness=0.0 if bolts is None else bolts.stiffness,
+            strips=self._width > 0,
+            **self._joints(ring),
         )
+
+    def _joints(self, ring) -> dict[str, Any]:
+        """Laws of joints and bolts, with what they take of the unknowns."""
+        mesh, to_nodes = self.mesh, self._to_nodes
+        found: dict[str, Any] = {"law": JointLaw(ring)}
+        if ring.joint_contact == "face":
+            points, faces = face_points(ring, mesh)
+            found = {
+                "law": FaceLaw(ring, points),
+                "faces": tilted(_without_zeros(faces @ to_nodes), ring.tilts[points.joint]),
+            }
+        if ring.bolts:
+            elongation = (bolt_elongation(ring, mesh) @ to_nodes).tocsr()
+            found |= {"bolts": elongation, "bolt_law": BoltLaw(ring), "bolts_reach": True}
+        return found
 
     def _held(self, ring):
         """Unknowns held at zero: the whole section next to the invert, or three that stop a free ring from drifting."""
@@ -205,10 +213,6 @@ class ContinuumLining(DiscreteLining):
     def _readings(self, ring, parts):
         mesh, to_nodes, theta = self.mesh, self._to_nodes, np.radians(THETA)
         forces = [part @ to_nodes for part in section_forces(mesh, self._stress, ring.centre_radius, theta)]
-        if self.bolts is not None:
-            pull = parts.tie_stiffness * parts.ties
-            shares = bolt_shares(ring, self.bolts, theta)
-            forces = [part + share @ pull for part, share in zip(forces, shares, strict=True)]
         sides = [(theta + side) % (2 * np.pi) for side in SIDES]
         columns = [mesh.locate(side)[0] for side in sides]
         moved = [section_displacements(mesh, side) for side in sides]
@@ -218,8 +222,9 @@ class ContinuumLining(DiscreteLining):
             quarters=self._quarters(ring) @ to_nodes,
             spring_angle=mesh.column_angles()[:, 1],
             lined=np.min([np.where(at < 0, 0.0, mesh.column_share[at]) for at in columns], axis=0),
-            near_force=near_anchors(ring, self.bolts, theta) if self.bolts else np.zeros(len(theta), dtype=bool),
+            near_force=near_anchors(ring, theta) if ring.bolts else np.zeros(len(theta), dtype=bool),
             weight_offset=ring.thickness**2 / 12 / ring.centre_radius,
+            bolt_shares=bolt_shares(ring, theta) if ring.bolts else None,
         )
 
     def _quarters(self, ring):
@@ -238,11 +243,6 @@ class ContinuumLining(DiscreteLining):
         if self.joint == "equivalent_strip":
             for name, part in zip(FORCES, self._strip_forces, strict=True):
                 fields[f"joint_{name}"] = (part @ states.displacements.T).T
-        if self.bolts is not None:
-            pull = self.bolts.stiffness * (self.parts.ties @ states.displacements.T).T
-            fields["joint_axial_force"] = fields["joint_axial_force"] - pull
-            fields["joint_bending_moment"] = fields["joint_bending_moment"] + self.bolts.offset * pull
-            fields["joint_bolt_force"] = ("time", "joint"), pull, BOLT_FORCE
         return fields
 
     def details(self) -> dict[str, str | float]:
@@ -253,10 +253,15 @@ class ContinuumLining(DiscreteLining):
         if self.gate is not None:
             attributes |= {"gate_angle": float(self.gate.angle), "gate_width": float(self.gate.width)}
             attributes["gate_cut"] = float(self.gate.cut)
-        for name, detail in (("groove", self.groove), ("bolts", self.bolts)):
-            if detail is not None:
-                attributes[name] = ", ".join(f"{part} {value:g}" for part, value in detail._asdict().items())
+        if self.groove is not None:
+            attributes["groove"] = ", ".join(f"{part} {value:g}" for part, value in self.groove._asdict().items())
         return attributes
+
+
+def _without_zeros(rows):
+    rows = rows.tocsr()
+    rows.eliminate_zeros()
+    return rows
 
 
 def _refuse_unsupported(ring: Ring, joint: str):
@@ -265,7 +270,17 @@ def _refuse_unsupported(ring: Ring, joint: str):
     if joint == "equivalent_strip":
         linear = "whose strips are linear; take zero-thickness joints"
         known |= dict.fromkeys(("joint_contact_height", "joint_friction_coefficient"), (None, linear))
-        known["joint_contact_only"] = (False, linear)
+        known |= {
+            "joint_contact_only": (False, linear),
+            "joint_contact": ("section", linear),
+            "joint_inclinations": ((), linear),
+        }
+        for name in ("joint_rotational_stiffness", "joint_shear_stiffness"):
+            if isinstance(getattr(ring, name), tuple):
+                raise ValueError(
+                    f"ring: {name} must be one for all joints where they are strips, got one for each; take"
+                    " zero-thickness joints"
+                )
     for name, (value, reason) in known.items():
         given = getattr(ring, name)
         if given != value:

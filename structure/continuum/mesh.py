@@ -69,8 +69,8 @@ class ContinuumMesh:
     gate : Gate or None
     groove : GasketGroove or None
         Its edges become lines of the mesh, with at least `layers` elements across the thickness.
-    anchor_angle : float or None
-        Angle of anchors from their joint [rad]: lines too, so that their force enters between columns, not inside one.
+    anchor_angles : tuple of float
+        Angles of anchors from their joint [rad]: lines too, so that their force enters between columns, not inside one.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class ContinuumMesh:
         strip_width: float = 0.0,
         gate: Gate | None = None,
         groove: GasketGroove | None = None,
-        anchor_angle: float | None = None,
+        anchor_angles: tuple[float, ...] = (),
     ):
         edges = _layer_edges(ring, layers, groove)
         self.layer_height = np.diff(edges)
@@ -121,13 +121,13 @@ class ContinuumMesh:
         if groove is not None:
             depth = ring.outer_radius - self.radius[1::2]
             self.groove_layers = (depth > groove.cover) & (depth < groove.cover + groove.height)
-        self._columns(ring, columns, strip_width, gate, groove, anchor_angle)
+        self._columns(ring, columns, strip_width, gate, groove, anchor_angles)
         self.n_lines, self.n_levels = len(self.angle), len(self.radius)
 
-    def _columns(self, ring, columns, strip_width, gate, groove, anchor_angle):
+    def _columns(self, ring, columns, strip_width, gate, groove, anchor_angles):
         """Columns of every body of concrete and of what fills the place after it: a strip, what bridges a hole."""
         groove_span = 0.0 if groove is None else groove.depth / ring.centre_radius
-        offsets = [offset for offset in (groove_span, anchor_angle) if offset]
+        offsets = [offset for offset in (groove_span, *anchor_angles) if offset]
         bridge = 0.0 if gate is None else 1 - gate.cut
         boundaries = _boundaries(ring, strip_width, gate)
         cells, joints = [], []  # of every column: begin, end, is it a strip, its share, is it beside a groove, a cut

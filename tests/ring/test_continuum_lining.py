@@ -18,14 +18,7 @@ BOTH = pytest.mark.parametrize("model", [BeamSpringLining, ContinuumLining])
 
 
 def curved_section(given, axial_force):
-    return theory.curved_section_moment(
-        axial_force,
-        given.thickness,
-        given.centre_radius,
-        given.bending_stiffness,
-        len(given.joint_angles),
-        given.joint_rotational_stiffness,
-    )
+    return theory.curved_section_moment(axial_force, given)
 
 
 @pytest.fixture(scope="module", params=["outer_face", "centre_line"])

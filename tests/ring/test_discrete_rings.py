@@ -87,16 +87,17 @@ def test_band_solves_as_a_full_matrix_does(symmetric, tied):
     pairs = pairs[1:]  # the first of the rolled ones would join both ends of the chain
     ties = sparse.csr_array(np.eye(size)[[3, 20]] - np.eye(size)[[30, 9]]) if tied else None
     held = np.array([5, 17])
-    band = BandedTangent(constant, rows, pairs, folded(size), held, symmetric, ties, 4.0)
+    band = BandedTangent(constant, rows, pairs, folded(size), held, symmetric, ties)
     coefficients = rng.uniform(0, 2, len(pairs))
     full = constant.toarray() + rows.toarray()[pairs[:, 0]].T @ (coefficients[:, None] * rows.toarray()[pairs[:, 1]])
-    full += 4.0 * (ties.T @ ties).toarray() if tied else 0.0
+    of_ties = np.array([4.0, 0.5]) if tied else np.zeros(0)
+    full += (ties.T @ (of_ties[:, None] * ties.toarray())) if tied else 0.0
     free = np.setdiff1d(node, held)
     right = rng.uniform(-1, 1, size)
     right[held] = 0
     expected = np.zeros(size)
     expected[free] = np.linalg.solve(full[np.ix_(free, free)], right[free])
-    np.testing.assert_allclose(band.factor(coefficients)(right), expected, atol=1e-13)
+    np.testing.assert_allclose(band.factor(np.append(coefficients, of_ties))(right), expected, atol=1e-13)
     assert band.width < 6
 
 
