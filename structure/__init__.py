@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from structure.lining import LiningFailure, LiningModel, additional
     from structure.models import lining_model, lining_model_names, register_lining_model
     from structure.passing import utilisations
-    from structure.ring import Bolts, Ground, Ring
+    from structure.ring import Bolts, Ground, Neighbour, Ring
     from structure.segment import SegmentSection
     from structure.theory import theoretical_pressures
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "Ring": "structure.ring",
     "Ground": "structure.ring",
+    "Neighbour": "structure.ring",
     "GushingWarning": "structure.inputs",
     "InputError": "structure.inputs",
     "LiningModel": "structure.lining",
@@ -59,6 +60,7 @@ __all__ = [
     "LiningFailure",
     "LiningModel",
     "Gate",
+    "Neighbour",
     "Ring",
     "SegmentSection",
     "additional",

@@ -13,6 +13,7 @@ from structure.limits import CHECK_VARIABLES, UTILISATIONS, Limits
 from structure.resistance import bearing_resistance, shear_resistance
 from structure.response import SHOWN
 from structure.ring import Ring
+from structure.stability import stability_checks
 
 
 def check(response: xr.Dataset, limits: Limits) -> xr.Dataset:
@@ -35,7 +36,8 @@ def check(response: xr.Dataset, limits: Limits) -> xr.Dataset:
         ``section_utilisation``, ``shear_utilisation``, ``crack_width``,
         ``crack_utilisation`` (time, theta), ``capacity_axial_force``, ``capacity_bending_moment`` (capacity_point);
         ``bearing_resistance``, ``bearing_utilisation``, ``gasket_opening``, ``gasket_utilisation``,
-        ``joint_dislocation_utilisation`` (time, joint); ``convergence_per_mille``, ``convergence_utilisation`` (time);
+        ``joint_dislocation_utilisation`` (time, joint); ``convergence_per_mille``, ``convergence_utilisation``,
+        ``flotation_utilisation``, ``ground_bearing_utilisation`` (time);
         ``<quantity>_utilisation`` of own limits; and ``largest_utilisation`` (time) of all. The attribute `limits`
         holds the limits as JSON. When and where each passes 1: :func:`structure.utilisations`.
 
@@ -60,6 +62,8 @@ def check(response: xr.Dataset, limits: Limits) -> xr.Dataset:
         variables |= _gasket_check(response, limits)
     if limits.convergence_per_mille is not None:
         variables |= _convergence_check(response, limits.convergence_per_mille, ring.outer_diameter)
+    if limits.stability is not None:
+        variables |= stability_checks(response, limits.stability, ring)
     dislocation = {} if limits.joint_dislocation is None else {"joint_dislocation": limits.joint_dislocation}
     for name, largest in (dislocation | limits.own).items():
         share = np.abs(response[name]) / largest

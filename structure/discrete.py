@@ -18,9 +18,10 @@ from structure.balance import borne, even_loads, without_unborne
 from structure.lining import THETA, LiningFailure, LiningModel, origin, response_dataset
 from structure.newton import NoEquilibrium, RingEquilibrium
 from structure.pressures import check_pressures
-from structure.response import FORCES
+from structure.response import FORCES, RESPONSE
 from structure.ring import Ring
-from structure.ring_forces import RingParts
+from structure.ring_forces import RingForces, RingParts
+from structure.staggered import coupling_springs, paired
 
 #: Units and long name of the one variable that only rings with bolts have.
 BOLT_FORCE = {"units": "N/m", "long_name": "force in the bolts of a joint per metre of tunnel, tension positive"}
@@ -80,6 +81,8 @@ class DiscreteLining(LiningModel):
     ring : Ring
     parts : RingParts
     readings : Readings
+    beside : DiscreteLining, optional
+        The ring beside, alone, where the ring has a neighbour: both are solved as one.
 
     Notes
     -----
@@ -87,11 +90,28 @@ class DiscreteLining(LiningModel):
     springs add what the ring's displacement mobilises.
     """
 
-    def __init__(self, ring: Ring, parts: RingParts, readings: Readings):
-        self.ring, self.parts, self.readings = ring, parts, readings
-        self._equilibrium = RingEquilibrium(ring, parts)
+    def __init__(self, ring: Ring, parts: RingParts, readings: Readings, beside: DiscreteLining | None = None):
+        self.ring, self.parts, self.readings, self.beside = ring, parts, readings, beside
+        self._forces = self._equilibrium = RingEquilibrium(ring, parts if beside is None else self._with(beside))
+        if beside is not None:
+            self._forces = RingForces(ring, parts)
         fine = np.radians(np.arange(0, 360, 0.5))
-        self._uplift, self._even = even_loads(fine, *self.tractions(fine), parts.rigid)
+        self._uplift, self._even = even_loads(fine, *self._all_tractions(fine), self._equilibrium.parts.rigid)
+
+    def _with(self, beside):
+        """This ring and the one beside it, coupled."""
+        pairs = zip(self.readings.movement, beside.readings.movement, strict=True)
+        apart = sparse.vstack([sparse.hstack([own, -other]) for own, other in pairs]).tocsr()
+        lined = self.readings.lined * beside.readings.lined
+        springs = coupling_springs(self.ring.neighbour, self.ring.centre_radius, lined)
+        return paired(self.parts, beside.parts, apart, np.concatenate(springs), self.ring.support == "invert")
+
+    def _all_tractions(self, theta):
+        own = self.tractions(theta)
+        if self.beside is None:
+            return own
+        pairs = zip(own, self.beside.tractions(theta), strict=True)
+        return tuple(sparse.vstack(pair).tocsr() for pair in pairs)
 
     @abstractmethod
     def tractions(self, theta: np.ndarray) -> tuple[sparse.csr_array, sparse.csr_array]:
@@ -110,21 +130,43 @@ class DiscreteLining(LiningModel):
     @one_thread
     def respond(self, pressures: xr.Dataset) -> xr.Dataset:
         checked = check_pressures(pressures, self.ring)
-        states = self.solve(checked)
+        both = self._solve_all(checked)
+        states = self._own(both)
         fields = {"balanced_uplift": states.balanced, "unborne_resultant": states.unborne}
         fields |= {name: self._where_lined(force) for name, force in self._section_forces(states.displacements)}
         fields |= self.joint_fields(states)
-        fields |= self._balances(states)
+        fields |= self._balances(both)
         fields["shear_moment_residual"] = self._shear_moment_residual(fields, states, checked)
         fields |= self._movements(states.displacements)
+        if self.beside is not None:
+            fields |= self._of_the_neighbour(both.displacements)
         return response_dataset(self.ring, checked, fields, self.name, self.details())
 
     def _section_forces(self, displacements):
         forces = [(part @ displacements.T).T for part in self.readings.forces]
         if self.readings.bolt_shares is not None:
-            pull, _ = self._equilibrium.bolt_forces(displacements)
+            pull, _ = self._forces.bolt_forces(displacements)
             forces = [force + pull @ share.T for force, share in zip(forces, self.readings.bolt_shares, strict=True)]
         return zip(FORCES, forces, strict=True)
+
+    def _of_the_neighbour(self, displacements):
+        """Forces in the ring beside, and those that one circumferential joint passes on."""
+        size, neighbour = len(self.parts.arm), self.ring.neighbour
+        own, other = displacements[:, :size], displacements[:, size:]
+        fields = {}
+        for name, force in self.beside._section_forces(other):
+            meaning = RESPONSE[name]
+            attributes = {"units": meaning[1], "long_name": f"{meaning[2]}, of the ring beside"}
+            fields[f"neighbour_{name}"] = ("time", "theta"), force, attributes
+        stiffnesses = neighbour.radial_stiffness, neighbour.tangential_stiffness
+        rows = zip(
+            ("radial", "tangential"), stiffnesses, self.readings.movement, self.beside.readings.movement, strict=True
+        )
+        for way, stiffness, here, there in rows:
+            passed = stiffness * ((here @ own.T).T - (there @ other.T).T)
+            about = f"{way} force on the ring beside per metre of a circumferential joint"
+            fields[f"circumferential_{way}_force"] = ("time", "theta"), passed, {"units": "N/m", "long_name": about}
+        return fields
 
     @one_thread
     def contact_field(self, pressures: xr.Dataset) -> xr.Dataset:
@@ -145,8 +187,8 @@ class DiscreteLining(LiningModel):
             raise ValueError("contact_field: joint_contact of the ring must be 'face', got 'section'; set it")
         checked, points = check_pressures(pressures, self.ring), self.parts.law.points
         states = self.solve(checked)
-        forces = self._equilibrium.joint_forces(states.displacements, states.slips)
-        gap = self._equilibrium.moved(states.displacements)[..., 0]
+        forces = self._forces.joint_forces(states.displacements, states.slips)
+        gap = self._forces.moved(states.displacements)[..., 0]
         fields = {
             "contact_pressure": (forces.axial / points.length, "Pa", "pressure between the faces of a joint"),
             "contact_shear": (forces.shear / points.length, "Pa", "shear between the faces of a joint, as of Q"),
@@ -169,14 +211,29 @@ class DiscreteLining(LiningModel):
 
     def loads(self, checked: xr.Dataset) -> np.ndarray:
         """Loads on the unknowns of checked pressures and of the concrete's weight, (n_times, n)."""
-        by_pressure, by_shear = self.tractions(np.radians(checked["theta"].values.astype(float)))
+        by_pressure, by_shear = self._all_tractions(np.radians(checked["theta"].values.astype(float)))
         pressure = (checked["soil_pressure"] + checked["water_pressure"]).values.astype(float)
         shear = checked["soil_shear"].values.astype(float)
-        return (by_pressure @ pressure.T + by_shear @ shear.T).T + self.parts.weight
+        return (by_pressure @ pressure.T + by_shear @ shear.T).T + self._equilibrium.parts.weight
 
     def solve(self, checked: xr.Dataset) -> States:
         """Equilibrium with checked pressures, one time after the other; raises as :meth:`respond` does."""
-        times, loads, rigid = checked["time"].values, self.loads(checked), self.parts.rigid
+        return self._own(self._solve_all(checked))
+
+    def _own(self, states):
+        """States of this ring alone."""
+        if self.beside is None:
+            return states
+        size, count, springs = len(self.parts.arm), self.parts.law.count, len(self.parts.area) // 2
+        return States(
+            states.loads[:, :size], states.displacements[:, :size], states.slips[:, :count],
+            np.hstack([half[:, :springs] for half in np.split(states.reactions, 2, axis=1)]),
+            states.balanced / 2, states.unborne,
+        )  # fmt: skip
+
+    def _solve_all(self, checked):
+        """States of this ring and of the one beside it."""
+        times, loads, rigid = checked["time"].values, self.loads(checked), self._equilibrium.parts.rigid
         balanced = np.zeros(len(loads))
         if self.ring.balance_uplift:
             balanced = loads @ rigid[1]
@@ -208,7 +265,7 @@ class DiscreteLining(LiningModel):
 
     def joint_fields(self, states: States) -> dict[str, np.ndarray]:
         """Movements of and forces in the joints, (n_times, n_joints) each."""
-        equilibrium, parts = self._equilibrium, self.parts
+        equilibrium, parts = self._forces, self.parts
         opening, dislocation, rotation = np.moveaxis(equilibrium.jumps(states.displacements), -1, 0)
         forces = equilibrium.joint_forces(states.displacements, states.slips)
         if parts.faces is None:
@@ -235,12 +292,13 @@ class DiscreteLining(LiningModel):
         }
 
     def _balances(self, states):
-        equilibrium, loads, held = self._equilibrium, states.loads, self.parts.held
+        equilibrium, loads = self._equilibrium, states.loads
+        rigid, held = equilibrium.parts.rigid / (1 if self.beside is None else 2), equilibrium.parts.held
         pairs = zip(states.displacements, states.slips, strict=True)
         internal = np.stack([equilibrium.internal_forces(*pair)[0] for pair in pairs])
         reactions = equilibrium.spring_forces(states.reactions)
         reactions[:, held] += (internal - loads - reactions)[:, held]
-        load_sum, reaction_sum = self.parts.rigid @ loads.T, self.parts.rigid @ reactions.T
+        load_sum, reaction_sum = rigid @ loads.T, rigid @ reactions.T
         gap = np.maximum(np.abs(load_sum + reaction_sum).max(0), np.abs(loads + reactions - internal).max(1))
         return {
             "load_sum_horizontal": load_sum[0],

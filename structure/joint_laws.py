@@ -275,19 +275,62 @@ class FaceLaw:
         return gaps, "sliding" if slides[~apart].all() else ""
 
 
-class BoltLaw:
+class BoltLaw(NamedTuple):
     """Bolts across the joints, as of :class:`structure.ring.Bolts`: they pull once their slack is used up.
 
-    Parameters
-    ----------
-    ring : Ring
+    stiffness [N/m2], slack [m], preload [N/m] : (n_joints,) float64 each.
     """
 
-    def __init__(self, ring: Ring):
-        stated = [(bolts.stiffness, bolts.slack, bolts.preload) for bolts in ring.bolts]
-        self.stiffness, self.slack, self.preload = np.array(stated).reshape(-1, 3).T
+    stiffness: np.ndarray
+    slack: np.ndarray
+    preload: np.ndarray
 
     def pull(self, elongation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Force [N/m] and its derivative [N/m2] at elongations (..., n_joints) [m]."""
         force = self.preload + self.stiffness * (elongation - self.slack)
         return np.maximum(force, 0.0), np.where(force > 0, self.stiffness, TANGENT_FLOOR * self.stiffness)
+
+
+def bolt_law(ring: Ring) -> BoltLaw:
+    """That of the bolts of a ring that has some."""
+    stated = [(bolts.stiffness, bolts.slack, bolts.preload) for bolts in ring.bolts]
+    return BoltLaw(*np.array(stated).T)
+
+
+class LawOfBoth:
+    """The laws of the joints of two rings, those of the first before those of the other.
+
+    one, other : JointLaw or FaceLaw, alike
+
+    Attributes
+    ----------
+    As of :class:`JointLaw`.
+    """
+
+    def __init__(self, one: JointLaw | FaceLaw, other: JointLaw | FaceLaw):
+        self.one, self.other = one, other
+        self.count, self.moves = one.count + other.count, one.moves
+        self.linear, self.conservative, self.remembers = one.linear, one.conservative, one.remembers
+        self.springs = np.concatenate([one.springs, other.springs])
+
+    def forces(self, moved: np.ndarray, slip: np.ndarray) -> JointForces:
+        """As of the two laws, (..., count, moves) and (..., count)."""
+        first = self.one.count
+        pair = (
+            self.one.forces(moved[..., :first, :], slip[..., :first]),
+            self.other.forces(moved[..., first:, :], slip[..., first:]),
+        )
+        axes = -2, -3, -1
+        return JointForces(
+            *(np.concatenate(each, axis) for each, axis in zip(zip(*pair, strict=True), axes, strict=True))
+        )
+
+    def states(self, moved: np.ndarray, forces: JointForces) -> list[str]:
+        """As of the two laws."""
+        first = self.one.count
+        ends = (self.one, slice(None, first)), (self.other, slice(first, None))
+        return [
+            word
+            for law, part in ends
+            for word in law.states(moved[part], JointForces(*(each[part] for each in forces)))
+        ]

@@ -25,6 +25,8 @@ UTILISATIONS = {
     "gasket_utilisation": "joint opening at the gasket",
     "joint_dislocation_utilisation": "joint dislocation",
     "convergence_utilisation": "convergence",
+    "flotation_utilisation": "flotation of the tunnel",
+    "ground_bearing_utilisation": "bearing of the ground below the tunnel",
     **{f"{name}_utilisation": f"own limit of the {SHOWN[name].name}" for name in OWN},
 }
 #: Variables that checks add to a response; they are no states of the ring.
@@ -58,6 +60,29 @@ class CapacityRule(Input):
     shear: bool
 
 
+class StabilityRule(Input):
+    """How the tunnel is set against the ground that holds it down and bears it; every value is the user's.
+
+    Parameters
+    ----------
+    cover : float
+        Ground above the crown [m].
+    buoyant_unit_weight : float
+        Of that ground in water [N/m3].
+    uplift_factor, weight_factor : float
+        Partial factors of the water's uplift and of what holds the tunnel down [-]: 1.0 and 0.9 are recommended in
+        EN 1997-1, Table A.15.
+    bearing_factor : float
+        Of the bearing resistance of the ground [-]: 1.4 in EN 1997-1, Table A.5, set R2.
+    """
+
+    cover: float = Field(gt=0)
+    buoyant_unit_weight: float = Field(gt=0)
+    uplift_factor: float = Field(gt=0)
+    weight_factor: float = Field(gt=0)
+    bearing_factor: float = Field(gt=0)
+
+
 class Limits(Input):
     """Limits of a lining; those left out are not checked, none has a default value.
 
@@ -81,6 +106,8 @@ class Limits(Input):
         Largest step between the segments of a joint [m].
     convergence_per_mille : float, optional
         Largest change of the horizontal or vertical diameter over the outer diameter [per mille].
+    stability : StabilityRule, optional
+        Flotation of the tunnel and bearing of the ground below it.
     own : dict
         Limits of your own: a quantity of :data:`structure.response.RESPONSE` to its largest size, in its unit there.
     """
@@ -96,6 +123,7 @@ class Limits(Input):
     gasket_offset: float | None = None
     joint_dislocation: float | None = Field(default=None, gt=0)
     convergence_per_mille: float | None = Field(default=None, gt=0)
+    stability: StabilityRule | None = None
     own: dict[str, float] = Field(default_factory=dict)
 
     @field_validator("own")
@@ -133,6 +161,7 @@ class Limits(Input):
         told += [] if capacity is None else ["M-N", *["shear"] * capacity.shear]
         told += [] if self.joint_contact_height is None else ["bearing of joints"]
         told += [f"{name} {1e3 * limit:g} mm" for name, limit in lengths.items() if limit is not None]
+        told += [] if self.stability is None else ["flotation and bearing"]
         told += [] if self.convergence_per_mille is None else [f"convergence {self.convergence_per_mille:g} per mille"]
         for name, limit in self.own.items():
             told.append(f"{SHOWN[name].short} {SHOWN[name].scale * limit:g} {SHOWN[name].unit}")
@@ -142,6 +171,8 @@ class Limits(Input):
         """Refuse limits that a ring cannot be held against. Raises ValueError."""
         if self.segment is not None:
             self.segment.check_thickness(ring.thickness)
+        if self.stability is not None and ring.ground is None:
+            raise ValueError("stability must be left out of a ring without ground, got one; give the ring its ground")
         keys = ("gasket_opening", "joint_dislocation", "joint_contact_height")
         joints = [name for name in keys if getattr(self, name) is not None]
         joints += [name for name in self.own if name.startswith("joint_")]

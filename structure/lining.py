@@ -12,6 +12,7 @@ from structure.limits import CHECK_VARIABLES
 from structure.pressures import PRESSURES, check_pressures
 from structure.response import COORDINATES, NOT_ADDITIONAL, RESPONSE
 from structure.springs import limit_pressures
+from structure.stability import resultants
 
 if TYPE_CHECKING:
     from structure.ring import Ring
@@ -81,9 +82,12 @@ def response_dataset(
 ) -> xr.Dataset:
     """Response to pressures with the schema's dimensions, units and names, and where it comes from.
 
+    What the pressures come to is added.
+
     fields : name of :data:`structure.response.RESPONSE` to array, of further variables to (dimensions, array,
     attributes);  model : its name;  details : further attributes.
     """
+    fields = resultants(pressures, ring.outer_radius) | fields
     variables = {name: (RESPONSE[name][0], value) if name in RESPONSE else value for name, value in fields.items()}
     joints = np.array(ring.joint_angles, dtype=float)
     axes = {

@@ -56,6 +56,8 @@ class ReducedRing:
     def __init__(self, lining: DiscreteLining, density: float, gravity: float, n_harmonics: int = 8):
         ring, parts = lining.ring, lining.parts
         self.outer_radius, self.radius = ring.outer_radius, ring.centre_radius
+        if lining.beside is not None:
+            raise InputError("ring: neighbour must be left out of a ring that moves in the ground, got one")
         if parts.faces is not None:
             raise InputError(
                 "ring: joint_contact must be 'section' for a ring that moves in the ground, got 'face'; give"

@@ -39,6 +39,8 @@ RESPONSE = {
     "spring_sum_horizontal": (("time",), "N/m", "horizontal sum of soil springs and support, right positive"),
     "spring_sum_vertical": (("time",), "N/m", "vertical sum of soil springs and support, up positive"),
     "balanced_uplift": (("time",), "N/m", "vertical sum of pressures and weight balanced by radial soil pressure"),
+    "water_uplift": (("time",), "N/m", "upward resultant of the water pressure on the outer face"),
+    "soil_support": (("time",), "Pa", "mean vertical soil stress on the lower half, upward, over the outer diameter"),
     "unborne_resultant": (
         ("time",),
         "1",

@@ -106,6 +106,29 @@ class Bolts(Input):
         return self
 
 
+class Neighbour(Input):
+    """Rings to both sides of a ring, built alike but turned, and the circumferential joints that couple them.
+
+    A plane model of a tunnel whose rings alternate: this ring, the other, this one again. Both bear the same pressures;
+    at every angle springs between their centre lines resist that they part. Source: the double-ring beam-spring model
+    of ITA WG2 (2000), Guidelines for the design of shield tunnel lining.
+
+    Parameters
+    ----------
+    rotation : float
+        By how much the other rings are turned, clockwise [degree].
+    ring_width : float
+        Of every ring along the tunnel [m].
+    radial_stiffness, tangential_stiffness : float
+        Of one circumferential joint, by metre of its length around the ring [N/m per metre].
+    """
+
+    rotation: float = Field(gt=-360, lt=360)
+    ring_width: float = Field(gt=0)
+    radial_stiffness: float = Field(ge=0)
+    tangential_stiffness: float = Field(ge=0)
+
+
 class Ring(Input):
     """A ring of segments, one metre of tunnel.
 
@@ -147,6 +170,8 @@ class Ring(Input):
         places of the faces stay radial. Empty: all radial.
     joint_bolts : Bolts or tuple of Bolts, optional
         Of all joints, or of each.
+    neighbour : Neighbour, optional
+        Rings beside this one, staggered; without them the ring stands alone.
     ground : Ground or None
         None: no soil springs; then loads and weight must balance, or `support` must carry the difference.
     balance_uplift : bool
@@ -179,6 +204,7 @@ class Ring(Input):
     joint_contact: Literal["section", "face"] = "section"
     joint_inclinations: tuple[float, ...] = ()
     joint_bolts: OneOrSeveral[Bolts] | None = None
+    neighbour: Neighbour | None = None
     ground: Ground | None = None
     balance_uplift: bool = False
     support: Literal["free", "invert"] = "free"
@@ -202,6 +228,8 @@ class Ring(Input):
                 " sort them, or raise n_elements"
             )
         self._check_joints()
+        if self.neighbour is not None and not self.joint_angles:
+            raise ValueError("neighbour: must be left out of a ring without joints, got one; all rings are alike")
         if self.support == "invert" and self.ground is not None:
             raise ValueError("support must be 'free' where there is ground, got 'invert'; remove one of the two")
         return self
@@ -309,6 +337,18 @@ class Ring(Input):
         return self.per_joint("joint_contact_height")
 
     @property
+    def beside(self) -> Ring:
+        """The ring beside this one, whose neighbour this one is."""
+        if self.neighbour is None:
+            raise ValueError("ring: must have a neighbour, got none; give one, or take the ring itself")
+        turned = (np.array(self.joint_angles) + self.neighbour.rotation) % 360
+        order = np.argsort(turned)
+        values = {name: getattr(self, name) for name in PER_JOINT}
+        own = {name: tuple(each[k] for k in order) for name, each in values.items() if isinstance(each, tuple) and each}
+        back = self.neighbour.model_copy(update={"rotation": -self.neighbour.rotation})
+        return self.model_copy(update={"joint_angles": tuple(turned[order]), "neighbour": back, **own})
+
+    @property
     def tilts(self) -> np.ndarray:
         """By how much the outer end of every joint leans clockwise, (n_joints,) float64 [rad]."""
         return np.radians(self.joint_inclinations or np.zeros(len(self.joint_angles)))
@@ -375,3 +415,8 @@ def check_ring(ring: object) -> None:
     if not isinstance(ring, Ring):
         hint = "give its .ring" if hasattr(ring, "ring") else "make one: structure.Ring(outer_diameter=.., ..)"
         raise InputError(f"ring: must be a structure.Ring, got a {type(ring).__name__}; {hint}")
+
+
+def alone(ring: Ring) -> Ring:
+    """A ring without its neighbour."""
+    return ring.model_copy(update={"neighbour": None})

@@ -255,6 +255,10 @@ class RingForces:
 
     def joint_words(self, joint: int) -> str:
         """Number and place of a joint."""
+        count = len(self.ring.joint_angles)
+        if joint >= count:
+            angle = self.ring.beside.joint_angles[joint - count]
+            return f"joint {joint - count + 1} of the ring beside ({angle:g} degrees)"
         return f"joint {joint + 1} ({self.ring.joint_angles[joint]:g} degrees)"
 
     def conditions(self, displacement: np.ndarray, slip: np.ndarray) -> str:

@@ -23,15 +23,20 @@ UNITS = {
     f"{table}.{name}": unit
     for (table, unit), names in {
         ("ring", "m"): "outer_diameter inner_diameter joint_contact_height joint_bolts.offset "
-        "joint_bolts.length joint_bolts.slack",
-        ("ring", "degree"): "joint_angles joint_inclinations ground.friction_angle",
+        "joint_bolts.length joint_bolts.slack neighbour.ring_width",
+        ("ring", "degree"): "joint_angles joint_inclinations neighbour.rotation ground.friction_angle",
         ("ring", "Pa"): "concrete_modulus ground.youngs_modulus ground.cohesion ground.vertical_stress "
         "ground.horizontal_stress ground.limit_pressure_normal ground.limit_pressure_tangential",
         ("ring", "N/m**3"): "concrete_unit_weight",
         ("ring", "N*m/rad/m"): "joint_rotational_stiffness",
-        ("ring", "N/m/m"): "joint_normal_stiffness joint_shear_stiffness joint_bolts.stiffness",
+        ("ring", "N/m/m"): "joint_normal_stiffness joint_shear_stiffness joint_bolts.stiffness "
+        "neighbour.radial_stiffness neighbour.tangential_stiffness",
         ("ring", "N/m"): "joint_bolts.preload",
-        ("limits", "m"): "gasket_opening gasket_offset joint_dislocation joint_contact_height crack_width "
+        ("limits", "N/m**3"): "stability.buoyant_unit_weight",
+        (
+            "limits",
+            "m",
+        ): "stability.cover gasket_opening gasket_offset joint_dislocation joint_contact_height crack_width "
         "capacity.minimum_eccentricity segment.cover_outer segment.cover_inner segment.bar_diameter_outer "
         "segment.bar_diameter_inner segment.bar_spacing_outer segment.bar_spacing_inner",
     }.items()

@@ -18,9 +18,9 @@ from structure.beams.elements import (
 )
 from structure.beams.mesh import RingMesh, displacements_at, forces_at
 from structure.discrete import SIDES, DiscreteLining, Readings
-from structure.joint_laws import FACE_POINTS, BoltLaw, FaceLaw, FacePoints, JointLaw
+from structure.joint_laws import FACE_POINTS, FaceLaw, FacePoints, JointLaw, bolt_law
 from structure.lining import THETA
-from structure.ring import Ring, check_ring
+from structure.ring import Ring, alone, check_ring
 from structure.ring_forces import RingParts, tilted, whole_movements
 
 
@@ -44,7 +44,8 @@ class BeamSpringLining(DiscreteLining):
     def __init__(self, ring: Ring):
         check_ring(ring)
         self.mesh = RingMesh(ring)
-        super().__init__(ring, _parts(ring, self.mesh), _readings(ring, self.mesh))
+        beside = None if ring.neighbour is None else BeamSpringLining(alone(ring.beside))
+        super().__init__(ring, _parts(ring, self.mesh), _readings(ring, self.mesh), beside)
 
     def tractions(self, theta: np.ndarray) -> tuple[sparse.csr_array, sparse.csr_array]:
         return traction_operator(self.ring, self.mesh, theta)
@@ -96,7 +97,7 @@ def _joints(ring: Ring, jumps: sparse.csr_array) -> dict[str, Any]:
         found |= {"law": FaceLaw(ring, points), "faces": sparse.vstack([gap, jumps[3 * joint + 1]]).tocsr()[in_turn]}
     if ring.bolts:
         offset = sparse.diags_array(np.array([bolts.offset for bolts in ring.bolts]))
-        found |= {"bolts": (jumps[::3] + offset @ jumps[2::3]).tocsr(), "bolt_law": BoltLaw(ring)}
+        found |= {"bolts": (jumps[::3] + offset @ jumps[2::3]).tocsr(), "bolt_law": bolt_law(ring)}
     return found
 
 

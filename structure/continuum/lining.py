@@ -16,11 +16,11 @@ from structure.continuum.joints import face_points, joint_jumps, nodes_from_unkn
 from structure.continuum.mesh import EDGE_MEAN, ContinuumMesh, GasketGroove, Gate
 from structure.continuum.sections import section_displacements, section_forces
 from structure.discrete import SIDES, DiscreteLining, Readings, States, one_thread
-from structure.joint_laws import BoltLaw, FaceLaw, JointLaw
+from structure.joint_laws import FaceLaw, JointLaw, bolt_law
 from structure.lining import THETA, origin
 from structure.pressures import check_pressures
 from structure.response import FORCES
-from structure.ring import Ring, check_ring
+from structure.ring import Ring, alone, check_ring
 from structure.ring_forces import RingParts, tilted, whole_movements
 
 #: Name: (dimensions, units, long name) of the stress dataset.
@@ -96,7 +96,12 @@ class ContinuumLining(DiscreteLining):
         #: Node displacements from the unknowns solved for; jumps across joints are unknowns themselves.
         self._to_nodes = nodes_from_unknowns(self.mesh)
         parts = self._parts(ring)
-        super().__init__(ring, parts, self._readings(ring, parts))
+        beside = None
+        if ring.neighbour is not None:  # the gate is open in this ring
+            beside = ContinuumLining(
+                alone(ring.beside), columns=columns, layers=layers, joint=joint, strip_width=strip_width, groove=groove
+            )
+        super().__init__(ring, parts, self._readings(ring, parts), beside)
         if joint == "equivalent_strip":
             at_joints = section_forces(self.mesh, self._stress, ring.centre_radius, np.radians(ring.joint_angles))
             self._strip_forces = [part @ self._to_nodes for part in at_joints]
@@ -187,7 +192,7 @@ class ContinuumLining(DiscreteLining):
             }
         if ring.bolts:
             elongation = (bolt_elongation(ring, mesh) @ to_nodes).tocsr()
-            found |= {"bolts": elongation, "bolt_law": BoltLaw(ring), "bolts_reach": True}
+            found |= {"bolts": elongation, "bolt_law": bolt_law(ring), "bolts_reach": True}
         return found
 
     def _held(self, ring):

@@ -14,6 +14,7 @@ from coupling.figures import utilisations as check_figures
 from structure import BeamSpringLining, CapacityRule, InputError, Limits, additional, check
 from structure.capacity import resultants
 from structure.limits import UTILISATIONS
+from structure.stability import bearing_resistance
 
 RULE = dict(axial_force_factor=1.0, moment_factor=1.35, minimum_eccentricity=0.02, utilisation="radial", shear=True)
 CHECKED = {
@@ -138,7 +139,7 @@ def test_constant_axial_force_differs_from_radial(response, checked):
 def test_limits_from_toml_are_the_same(tmp_path):
     path = tmp_path / "limits.toml"
     given = limits().model_dump()
-    lines = [f"{k} = {v!r}" for k, v in given.items() if not isinstance(v, dict)]
+    lines = [f"{k} = {v!r}" for k, v in given.items() if not isinstance(v, dict | None)]
     for table in ("segment", "capacity", "own"):
         lines += [f"[{table}]", *(f"{k} = {v!r}" for k, v in given[table].items())]
     path.write_text("\n".join(lines).replace("True", "true"))
@@ -221,3 +222,40 @@ def test_figure_of_a_single_state_without_section(response, tmp_path):
     assert len(figure.axes) == 1
     with pytest.raises(ValueError, match=r"must come from structure\.check"):
         check_figures.checks(response)
+
+
+def stable(**changes):
+    rule = dict(cover=20.0, buoyant_unit_weight=8900.0, uplift_factor=1.0, weight_factor=0.9, bearing_factor=1.4)
+    return Limits(stability=rule | changes)
+
+
+def test_flotation_is_the_uplift_over_the_weights_by_hand():
+    response = BeamSpringLining(ring()).respond(pressures())
+    checked = check(response, stable()).isel(time=0)
+    weight = 25e3 * np.pi * (3.3**2 - 2.95**2) + 8900.0 * (6.6 * (20.0 + 3.3) - np.pi * 3.3**2 / 2)
+    # 1e-3: pressures at whole degrees
+    assert checked["flotation_utilisation"].item() == pytest.approx(9810 * np.pi * 3.3**2 / (0.9 * weight), rel=1e-3)
+    lost = response.assign_coords(inflow_mass=("time", [5e4]))
+    lighter = check(lost, stable()).isel(time=0)
+    assert lighter["flotation_utilisation"].item() == pytest.approx(
+        9810 * np.pi * 3.3**2 / (0.9 * (weight - 9.81 * 5e4)), rel=1e-3
+    )
+    assert lighter["largest_utilisation"] == lighter["flotation_utilisation"]
+
+
+def test_bearing_of_the_ground_by_hand():
+    """phi = 25 degrees: N_q = 10.66, N_gamma = 9.01, as tables have them."""
+    response = BeamSpringLining(ring()).respond(pressures())
+    checked = check(response, stable()).isel(time=0)
+    resisted = 8900.0 * 26.6 * 10.662 + 0.5 * 8900.0 * 6.6 * 2 * 9.662 * np.tan(np.radians(25))
+    theta = np.radians(np.arange(90.5, 270.0, 1.0))
+    loads = pressures().isel(time=0).interp(theta=np.degrees(theta))
+    upward = -np.cos(theta) * loads["soil_pressure"] - np.sin(theta) * loads["soil_shear"]
+    stress = float(upward.sum()) * 3.3 * np.radians(1.0) / 6.6
+    assert checked["ground_bearing_utilisation"].item() == pytest.approx(1.4 * stress / resisted, rel=1e-3)
+    assert bearing_resistance(1e4, 0.0, 0.0, 0.0) == pytest.approx(1e4 * (np.pi + 2))
+
+
+def test_stability_needs_ground():
+    with pytest.raises(ValueError, match="stability must be left out of a ring without ground"):
+        check(BeamSpringLining(ring(ground=None, balance_uplift=True)).respond(pressures()), stable())

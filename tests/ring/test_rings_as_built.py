@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from rings import largest, mirrored, pressures, ring, tractions
 
+import coupling
 from structure import BeamSpringLining, Bolts, ContinuumLining, InputError, LiningFailure
 
 BOTH = pytest.mark.parametrize("model", [BeamSpringLining, ContinuumLining])
@@ -125,3 +126,50 @@ def test_contact_field_carries_the_forces_of_the_joints():
 def test_joints_that_mean_nothing_are_refused(changes, message):
     with pytest.raises(InputError, match=message):
         ring(**changes)
+
+
+SCENE = """
+base = "quick"
+[ring]
+joint_normal_stiffness = ["600 MN/m", 6e8, 6e8, 6e8, 6e8, 6e8]
+joint_inclinations = [-6, 0, 0, 0, 0, 6]
+joint_friction_coefficient = [0.5, 0.4, 0.4, 0.4, 0.4, 0.5]
+neighbour = { rotation = 30, ring_width = "1200 mm", radial_stiffness = "100 MN/m", tangential_stiffness = 1e8 }
+joint_bolts = { offset = "-5 cm", length = 0.4, stiffness = "100 MN/m", preload = "200 kN" }
+"""
+
+
+def test_scene_takes_a_ring_as_it_is_built(tmp_path):
+    path = tmp_path / "built.toml"
+    path.write_text(SCENE)
+    scene = coupling.load_scene(path)
+    assert scene.ring.joint_springs[0, 0] == 6e8 and scene.ring.bolts[0].preload == 2e5
+    assert scene.ring.neighbour.ring_width == 1.2 and scene.ring.bolts[0].offset == pytest.approx(-0.05)
+    again = coupling.scenes.scene.parse_scene(scene.source, "again")
+    assert again.ring == scene.ring
+    each = [f'{{ offset = 0, length = 0.4, stiffness = "{k} MN/m" }}' for k in range(6)]
+    path.write_text(SCENE.partition("joint_bolts")[0] + f"joint_bolts = [{', '.join(each)}]\n")
+    scene = coupling.load_scene(path)
+    assert [bolts.stiffness for bolts in scene.ring.bolts] == [1e6 * k for k in range(6)]
+    assert coupling.scenes.scene.parse_scene(scene.source, "again").ring == scene.ring
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"600 MN/m", 6e8', '"600 MN/m", -6e8', "joint_normal_stiffness.1"),
+        ("[-6, 0, 0, 0, 0, 6]", "[-6, 6]", "joint_inclinations must be one for all joints or 6"),
+        ("offset =", "ofset =", "did you mean 'offset'"),
+        ("rotation = 30, ", "", "rotation missing"),
+        (
+            'base = "quick"',
+            'base = "quick"\nlining = "jointed"',
+            "a ring alone whose joints act by sections, got neigh",
+        ),
+    ],
+)
+def test_mistakes_in_a_ring_as_built_are_told(tmp_path, old, new, message):
+    path = tmp_path / "built.toml"
+    path.write_text(SCENE.replace(old, new))
+    with pytest.raises(coupling.SceneError, match=message):
+        coupling.load_scene(path)
