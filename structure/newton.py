@@ -106,7 +106,7 @@ class RingEquilibrium(RingForces):
             if target == 1.0:
                 self.iterations.append(steps)
                 return reached, slip
-            displacement, done = reached, target
+            displacement, done, increment = reached, target, 2 * increment
             slip = self.joint_forces(displacement, slip).slip
 
     def solve(self, loads: np.ndarray, start: np.ndarray, slip: np.ndarray | None = None) -> np.ndarray:

@@ -104,7 +104,7 @@ def _joints(ring: Ring, jumps: sparse.csr_array) -> dict[str, Any]:
 def _readings(ring: Ring, mesh: RingMesh) -> Readings:
     theta = np.radians(THETA)
     at_theta = forces_at(mesh, theta)
-    sides = [displacements_at(mesh, theta + side) for side in SIDES]
+    sides = [displacements_at(mesh, theta + side, ring.centre_radius) for side in SIDES]
     movement = tuple((one + other) / 2 for one, other in zip(*sides, strict=True))
     return Readings(
         forces=tuple((at_theta @ part).tocsr() for part in section_operators(ring, mesh)),

@@ -86,10 +86,13 @@ def forces_at(mesh: RingMesh, theta: np.ndarray) -> sparse.csr_array:
     return sparse.coo_array((np.concatenate(shares), place), shape=(len(theta), len(middle))).tocsr()
 
 
-def displacements_at(mesh: RingMesh, theta: np.ndarray) -> tuple[sparse.csr_array, sparse.csr_array]:
+def displacements_at(
+    mesh: RingMesh, theta: np.ndarray, centre_radius: float
+) -> tuple[sparse.csr_array, sparse.csr_array]:
     """Radial and tangential displacement of the centre line at theta [rad], (n_theta, 3 n_nodes) each.
 
-    Straight between the two nodes of an element. On a joint one of its sides is taken.
+    Straight between the two nodes of an element; the section's rotation moves the circle against the chord, so that a
+    turn of the whole ring is one of the circle. On a joint one of its sides is taken.
     """
     along = (theta[:, None] - mesh.node_angle[mesh.first]) % (2 * np.pi)
     element = np.argmax(along <= mesh.span, axis=1)
@@ -97,7 +100,8 @@ def displacements_at(mesh: RingMesh, theta: np.ndarray) -> tuple[sparse.csr_arra
     nodes = np.stack([mesh.first[element], mesh.second[element]], axis=1)
     of_node, lean = np.stack([1 - share, share], axis=1), theta[:, None] - mesh.node_angle[nodes]
     cosine, sine = of_node * np.cos(lean), of_node * np.sin(lean)
+    off = -sine.sum(axis=1), 1 - cosine.sum(axis=1)
     return tuple(
-        mesh.gathered(np.stack([*parts, np.zeros_like(lean)], axis=2).reshape(-1, 6), *nodes.T)
-        for parts in ((cosine, sine), (-sine, cosine))
+        mesh.gathered(np.stack([*parts, centre_radius * far[:, None] * of_node], axis=2).reshape(-1, 6), *nodes.T)
+        for parts, far in zip(((cosine, sine), (-sine, cosine)), off, strict=True)
     )

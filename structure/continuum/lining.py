@@ -220,7 +220,7 @@ class ContinuumLining(DiscreteLining):
         forces = [part @ to_nodes for part in section_forces(mesh, self._stress, ring.centre_radius, theta)]
         sides = [(theta + side) % (2 * np.pi) for side in SIDES]
         columns = [mesh.locate(side)[0] for side in sides]
-        moved = [section_displacements(mesh, side) for side in sides]
+        moved = [section_displacements(mesh, side, ring.centre_radius) for side in sides]
         return Readings(
             forces=tuple(forces),
             movement=tuple((one + other) / 2 @ to_nodes for one, other in zip(*moved, strict=True)),
@@ -240,7 +240,8 @@ class ContinuumLining(DiscreteLining):
             distance = np.abs((quarters - np.radians(self.gate.angle) + np.pi) % (2 * np.pi) - np.pi)
             half = self.gate.width / 2 / ring.centre_radius
             off = np.where(distance < half, half + distance, off)
-        sides = [section_displacements(self.mesh, (quarters + side) % (2 * np.pi))[0] for side in (-off, off)]
+        places = [(quarters + side) % (2 * np.pi) for side in (-off, off)]
+        sides = [section_displacements(self.mesh, place, ring.centre_radius)[0] for place in places]
         return (sides[0] + sides[1]) / 2
 
     def joint_fields(self, states: States) -> dict[str, np.ndarray]:

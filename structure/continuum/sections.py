@@ -76,12 +76,27 @@ def edge_shapes(place: np.ndarray) -> np.ndarray:
     return np.stack([(1 - place) * (1 - 2 * place), 4 * place * (1 - place), place * (2 * place - 1)], axis=-1)
 
 
-def section_displacements(mesh: ContinuumMesh, theta: np.ndarray) -> tuple[sparse.csr_array, sparse.csr_array]:
-    """Mean radial and tangential displacement of the sections at theta [rad], (n_theta, n_unknowns) each."""
+def section_displacements(
+    mesh: ContinuumMesh, theta: np.ndarray, centre_radius: float
+) -> tuple[sparse.csr_array, sparse.csr_array]:
+    """Mean radial and tangential displacement of the sections at theta [rad], (n_theta, n_unknowns) each.
+
+    Quadratic between the lines of a column, as vectors; their sections' rotation moves the circle against that, so that
+    the whole ring's movements are those of its sections.
+    """
     column, place = mesh.locate(theta)
     inside = np.flatnonzero(column >= 0)
-    weights = edge_shapes(place[inside])[:, :, None] * mesh.level_mean
-    return tuple(_gather(mesh, mesh.column_lines[column[inside]], weights, inside, len(theta), way) for way in (0, 1))
+    lines, shapes = mesh.column_lines[column[inside]], edge_shapes(place[inside])
+    lean = theta[inside, None] - mesh.angle[lines]
+    cosine, sine = shapes * np.cos(lean), shapes * np.sin(lean)
+    lever = mesh.radius - centre_radius
+    slope = mesh.level_mean * lever / (mesh.level_mean @ lever**2)
+    rows = []
+    for outward, along, turned in ((cosine, sine, 0.0), (-sine, cosine, 1.0)):
+        off = centre_radius * (turned - along.sum(axis=1))[:, None] * shapes
+        parts = outward[:, :, None] * mesh.level_mean, along[:, :, None] * mesh.level_mean + off[:, :, None] * slope
+        rows.append(sum(_gather(mesh, lines, part, inside, len(theta), way) for way, part in enumerate(parts)).tocsr())
+    return rows[0], rows[1]
 
 
 def column_means(mesh: ContinuumMesh, edge_mean: np.ndarray) -> tuple[sparse.csr_array, sparse.csr_array]:
