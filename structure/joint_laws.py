@@ -165,7 +165,7 @@ class JointLaw:
         self.linear = not (limited and ring.joint_angles)
         self.conservative = self.linear or (self.height is None and self.friction is None)
 
-    def forces(self, moved: np.ndarray, slip: np.ndarray) -> JointForces:
+    def forces(self, moved: np.ndarray, slip: np.ndarray, pressed: np.ndarray | None = None) -> JointForces:
         """Forces in the joints.
 
         Parameters
@@ -174,6 +174,8 @@ class JointLaw:
             Opening [m], dislocation [m], rotation [rad].
         slip : (..., n_joints) float64
             Slip before [m]; zero for a joint that never slid.
+        pressed : (..., n_joints) float64, optional
+            Axial forces [N/m] that limit Q and M in place of those of the openings; the forces then have an energy.
         """
         opening, dislocation, rotation = np.moveaxis(moved, -1, 0)
         tangent = np.zeros((*moved.shape, 3))
@@ -184,14 +186,18 @@ class JointLaw:
         if self.friction is None:
             shear, by_dislocation = self.shear * dislocation, self.shear
         else:
-            shear, by_dislocation, by_axial, slip = limited_shear(dislocation, slip, axial, self.shear, self.friction)
-            tangent[..., 1, 0] = by_axial * axial_by_opening
+            limiting = axial if pressed is None else pressed
+            shear, by_dislocation, by_axial, slip = limited_shear(
+                dislocation, slip, limiting, self.shear, self.friction
+            )
+            tangent[..., 1, 0] = by_axial * axial_by_opening if pressed is None else 0.0
         tangent[..., 1, 1] = np.maximum(by_dislocation, self.floors[:, 1])
         if self.height is None:
             moment, by_rotation = self.rotation * rotation, self.rotation
         else:
-            moment, by_rotation, by_axial = contact_moment(rotation, axial, self.rotation, self.height)
-            tangent[..., 2, 0] = by_axial * axial_by_opening
+            limiting = axial if pressed is None else pressed
+            moment, by_rotation, by_axial = contact_moment(rotation, limiting, self.rotation, self.height)
+            tangent[..., 2, 0] = by_axial * axial_by_opening if pressed is None else 0.0
         tangent[..., 2, 2] = np.maximum(by_rotation, self.floors[:, 2])
         return JointForces(np.stack([-axial, shear, moment], axis=-1), tangent, slip)
 
@@ -245,8 +251,11 @@ class FaceLaw:
         self.friction = None if friction is None else ring.per_joint("joint_friction_coefficient")[points.joint]
         self.conservative, self.remembers = friction is None, friction is not None
 
-    def forces(self, moved: np.ndarray, slip: np.ndarray) -> JointForces:
-        """Forces at the points from gap and slide (..., n, 2) [m] and the slip before (..., n) [m]."""
+    def forces(self, moved: np.ndarray, slip: np.ndarray, pressed: np.ndarray | None = None) -> JointForces:
+        """Forces at the points from gap and slide (..., n, 2) [m] and the slip before (..., n) [m].
+
+        pressed : as of :meth:`JointLaw.forces`
+        """
         opening, slide = np.moveaxis(moved, -1, 0)
         tangent = np.zeros((*moved.shape, 2))
         apart = opening > 0
@@ -255,8 +264,9 @@ class FaceLaw:
         if self.friction is None:
             shear, by_slide = self.shear * slide, self.shear
         else:
-            shear, by_slide, by_axial, slip = limited_shear(slide, slip, axial, self.shear, self.friction)
-            tangent[..., 1, 0] = np.where(apart, 0.0, -self.normal * by_axial)
+            limiting = axial if pressed is None else pressed
+            shear, by_slide, by_axial, slip = limited_shear(slide, slip, limiting, self.shear, self.friction)
+            tangent[..., 1, 0] = np.where(apart | (pressed is not None), 0.0, -self.normal * by_axial)
         tangent[..., 1, 1] = np.maximum(by_slide, self.floors[1])
         return JointForces(np.stack([-axial, shear], axis=-1), tangent, slip)
 
@@ -313,17 +323,15 @@ class LawOfBoth:
         self.linear, self.conservative, self.remembers = one.linear, one.conservative, one.remembers
         self.springs = np.concatenate([one.springs, other.springs])
 
-    def forces(self, moved: np.ndarray, slip: np.ndarray) -> JointForces:
+    def forces(self, moved: np.ndarray, slip: np.ndarray, pressed: np.ndarray | None = None) -> JointForces:
         """As of the two laws, (..., count, moves) and (..., count)."""
-        first = self.one.count
-        pair = (
-            self.one.forces(moved[..., :first, :], slip[..., :first]),
-            self.other.forces(moved[..., first:, :], slip[..., first:]),
-        )
-        axes = -2, -3, -1
-        return JointForces(
-            *(np.concatenate(each, axis) for each, axis in zip(zip(*pair, strict=True), axes, strict=True))
-        )
+        first, found = self.one.count, []
+        for law, part in ((self.one, slice(None, first)), (self.other, slice(first, None))):
+            found.append(
+                law.forces(moved[..., part, :], slip[..., part], None if pressed is None else pressed[..., part])
+            )
+        pairs = zip(zip(*found, strict=True), (-2, -3, -1), strict=True)
+        return JointForces(*(np.concatenate(pair, axis) for pair, axis in pairs))
 
     def states(self, moved: np.ndarray, forces: JointForces) -> list[str]:
         """As of the two laws."""

@@ -23,6 +23,11 @@ LARGEST_DISPLACEMENT = 0.1
 SOFTEST = 2e-15
 #: Smallest part of a load increment tried before a ring with nonlinear joints is given up.
 SMALLEST_INCREMENT = 1 / 256
+#: Iterations after which joints that slide or gape are tried with the axial forces found last as the limits of Q and M,
+#: which gives their forces an energy; how often; and the change of displacements, over the largest, that ends it.
+MAX_DIRECT, MAX_LIMITS, CLOSE = 30, 20, 1e-4
+#: Axial force that limits nothing [N/m], of joints not loaded yet.
+UNLIMITED = 1e30
 #: Smallest part of a Newton step tried.
 SMALLEST_SHARE = 2.0**-10
 
@@ -114,10 +119,35 @@ class RingEquilibrium(RingForces):
         if self.loose:
             raise NoEquilibrium(self.loose)
         slip = self.unslipped if slip is None else slip
+        if self.joints.conservative:
+            return self._newton(loads, start, slip)
+        try:
+            return self._newton(loads, start, slip, MAX_DIRECT)
+        except NoEquilibrium:
+            return self._by_limits(loads, start, slip)
+
+    def _by_limits(self, loads, start, slip):
+        """As of :meth:`solve`: friction and moments limited by the axial forces found last, until these stay."""
+        last = start
+        for _ in range(MAX_LIMITS):
+            axial = self.joint_forces(last, slip).axial
+            self.pressed = axial if axial.any() else np.full_like(axial, UNLIMITED)
+            try:
+                reached = self._newton(loads, last, slip)
+            finally:
+                self.pressed = None
+            close = self.sizes(reached - last).max() < CLOSE * self.sizes(reached).max()
+            last = reached
+            if close:
+                break
+        return self._newton(loads, last, slip, MAX_DIRECT)
+
+    def _newton(self, loads, start, slip, most=MAX_ITERATIONS):
+        """As of :meth:`solve`, in so many iterations at most."""
         tolerance = RESIDUAL_TOLERANCE * np.abs(loads / self.parts.arm).sum()
         displacement, self.residuals = start.copy(), []
         out_of_balance, coefficients = self.residual(displacement, loads, slip)
-        for _ in range(MAX_ITERATIONS):
+        for _ in range(most):
             rounding = ROUNDINGS * np.finfo(float).eps * (self.magnitudes @ np.abs(displacement))
             self.residuals.append(float(np.abs(out_of_balance).max()))
             if np.all(np.abs(out_of_balance) <= np.maximum(tolerance, rounding)):
@@ -137,7 +167,7 @@ class RingEquilibrium(RingForces):
         worst = int(self.sizes(out_of_balance).argmax())
         raise NoEquilibrium(
             f"the largest out-of-balance force is still {np.abs(out_of_balance).max():.3g} N/m {self.place(worst)}"
-            f" after {MAX_ITERATIONS} iterations (wanted {tolerance:.3g}): the loads are close to what the ground and"
+            f" after {most} iterations (wanted {tolerance:.3g}): the loads are close to what the ground and"
             " the joints can carry" + self.conditions(displacement, slip)
         )
 
@@ -147,7 +177,8 @@ class RingEquilibrium(RingForces):
             solver = self.tangent.factor(coefficients)
         except Mechanism as mechanism:
             raise NoEquilibrium(self.loose_place(mechanism.motion)) from mechanism
-        search = self._along_energy if self.joints.conservative else self._towards_shorter_steps
+        conservative = self.joints.conservative or self.pressed is not None
+        search = self._along_energy if conservative else self._towards_shorter_steps
         return search(displacement, solver(out_of_balance), solver, out_of_balance, loads, slip)
 
     def _along_energy(self, displacement, step, _, out_of_balance, loads, slip):

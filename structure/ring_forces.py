@@ -145,6 +145,8 @@ class RingForces:
         self.springs = soil_springs(ring) if ring.ground is not None else None
         self.joints = parts.law
         self.unslipped = np.zeros(parts.law.count)
+        #: As of :meth:`structure.joint_laws.JointLaw.forces`, on the way to an equilibrium.
+        self.pressed: np.ndarray | None = None
         linear = parts.linear
         constant = linear if self.joints.linear else parts.body
         bolts = None if parts.bolts is None else springs_at(parts.bolts, parts.bolt_law.stiffness)
@@ -193,7 +195,7 @@ class RingForces:
 
     def joint_forces(self, displacement: np.ndarray, slip: np.ndarray) -> JointForces:
         """Forces in the joints, or at points of their faces, at displacements (..., n) reached from slips."""
-        return self.joints.forces(self.moved(displacement), slip)
+        return self.joints.forces(self.moved(displacement), slip, self.pressed)
 
     def bolt_forces(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pull of the bolts of every joint [N/m] and its tangent [N/m2], (..., n_joints); none without bolts."""
