@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
+from structure import joint_laws
 from structure.banded import folded
 from structure.beams.elements import (
     joint_jumps,
@@ -18,7 +19,7 @@ from structure.beams.elements import (
 )
 from structure.beams.mesh import RingMesh, displacements_at, forces_at
 from structure.discrete import SIDES, DiscreteLining, Readings
-from structure.joint_laws import FACE_POINTS, FaceLaw, FacePoints, JointLaw, bolt_law
+from structure.joint_laws import FaceLaw, FacePoints, JointLaw, bolt_law
 from structure.lining import THETA
 from structure.ring import Ring, alone, check_ring
 from structure.ring_forces import RingParts, tilted, whole_movements
@@ -88,10 +89,10 @@ def _joints(ring: Ring, jumps: sparse.csr_array) -> dict[str, Any]:
     found: dict[str, Any] = {"law": JointLaw(ring)}
     count = len(ring.joint_angles)
     if ring.joint_contact == "face":
-        joint = np.repeat(np.arange(count), FACE_POINTS)
-        place = (np.arange(FACE_POINTS) + 0.5) / FACE_POINTS - 0.5
+        each = joint_laws.FACE_POINTS
+        joint, place = np.repeat(np.arange(count), each), (np.arange(each) + 0.5) / each - 0.5
         lever = np.outer(ring.contact_heights, place).ravel()
-        points = FacePoints(joint, lever, ring.contact_heights[joint] / FACE_POINTS)
+        points = FacePoints(joint, lever, ring.contact_heights[joint] / each)
         gap = jumps[3 * joint] + sparse.diags_array(lever) @ jumps[3 * joint + 2]
         in_turn = np.arange(2 * len(joint)).reshape(2, -1).T.ravel()
         found |= {"law": FaceLaw(ring, points), "faces": sparse.vstack([gap, jumps[3 * joint + 1]]).tocsr()[in_turn]}

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from structure import joint_laws
 from structure.continuum.mesh import ContinuumMesh
 from structure.continuum.sections import edge_shapes
-from structure.joint_laws import FACE_POINTS, FacePoints
+from structure.joint_laws import FacePoints
 from structure.ring import Ring
 
 #: Integrals of products of the three shape functions of a quadratic edge of unit length.
@@ -103,7 +104,7 @@ def face_points(ring: Ring, mesh: ContinuumMesh) -> tuple[FacePoints, sparse.csr
             low, high = max(edges[layer], -height / 2), min(edges[layer + 1], height / 2)
             if high <= low:
                 continue
-            count = max(2, round(FACE_POINTS * (high - low) / height))
+            count = max(2, round(joint_laws.FACE_POINTS * (high - low) / height))
             at = low + (high - low) * (np.arange(count) + 0.5) / count
             joint.append(np.full(count, k))
             lever.append(at)

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 import coupling
 from structure import BeamSpringLining, ContinuumLining, Ring
 from structure.joint_laws import FACE_POINTS, FaceLaw, FacePoints, contact_moment
-from structure.lining import THETA
+from verification.robustness.random_rings import growing_load
 
 HEIGHT, FRICTION = 0.3, 0.06
 SECTION = {"joint_contact_only": True, "joint_contact_height": HEIGHT, "joint_friction_coefficient": FRICTION}
@@ -19,8 +19,6 @@ FACE = {
     "joint_contact": "face", "joint_contact_height": HEIGHT, "joint_friction_coefficient": FRICTION,
     "joint_normal_stiffness": 1e10,
 }  # fmt: skip
-A = np.radians(THETA)
-MOVED = ("joint_axial_force", "joint_opening", "joint_rotation", "joint_dislocation", "axial_force", "bending_moment")
 
 
 def case_3(laws):
@@ -30,21 +28,11 @@ def case_3(laws):
     return Ring(**(values | laws))
 
 
-def random_load(rng, steps=3):
-    """Four waves of pressure and a shear that ovalises, grown in steps: most joints gape, some slide."""
-    waves = sum(rng.uniform(-2.5e5, 2.5e5) / n * np.cos(n * A - rng.uniform(0, 6.3)) for n in range(2, 6))
-    shear = 1.5e4 * np.sin(2 * A - rng.uniform(0, 6.3))
-    time = np.arange(1, steps + 1) / steps
-    pressure = 3.9e5 * (1 + 0.15 * rng.uniform()) + time[:, None] * waves
-    parts = {"soil_pressure": pressure, "water_pressure": 0 * pressure, "soil_shear": time[:, None] * shear}
-    return xr.Dataset({name: (("time", "theta"), part) for name, part in parts.items()}, {"time": time, "theta": THETA})
-
-
 @cache
 def answers_of(contact):
     """Of both models to twelve loads, one dataset each along `load`."""
     ring, rng = case_3({"section": SECTION, "face": FACE}[contact]), np.random.default_rng(0)
-    models, loads = (BeamSpringLining(ring), ContinuumLining(ring, columns=90)), [random_load(rng) for _ in range(12)]
+    models, loads = (BeamSpringLining(ring), ContinuumLining(ring, columns=90)), [growing_load(rng) for _ in range(12)]
     return tuple(xr.concat([model.respond(load) for load in loads], "load") for model in models)
 
 
@@ -91,7 +79,7 @@ def test_faces_turn_under_a_moment_as_a_block_without_tension():
 
 def test_stresses_are_those_of_the_section_beside_a_gaping_joint():
     ring = case_3(SECTION)
-    model, loads = ContinuumLining(ring, columns=180), random_load(np.random.default_rng(0))
+    model, loads = ContinuumLining(ring, columns=180), growing_load(np.random.default_rng(0))
     field, answer = model.stress_field(loads).isel(time=-1), model.respond(loads).isel(time=-1)
     edge = np.isclose(field["radius"], field["radius"].max())
     hoop, outer = field["stress_tt"].values[edge], field["theta"].values[edge]

@@ -13,6 +13,7 @@ from verification.robustness.random_rings import (
     RADIUS,
     SPRINGS,
     WAYS,
+    extreme_ring,
     loads_of,
     outcome,
     random_angles,
@@ -156,3 +157,22 @@ def test_loads_have_the_resultants_of_their_tractions(columns):
         # 1e-12 of the loads: exact between the samples but for rounding
         assert response["load_sum_horizontal"].item() == pytest.approx(right, abs=1e-12 * 4e6)
         assert response["load_sum_vertical"].item() == pytest.approx(up, abs=1e-12 * 4e6)
+
+
+def test_extreme_joints_are_solved_or_refused_alike_by_both_models():
+    """Sixteen of the 64 rings of docs/rings-as-built.md, on a coarse continuum."""
+    rng, answers = np.random.default_rng(0), []
+    for _ in range(16):
+        ring = extreme_ring(rng, rings.ground())
+        pair = [outcome(model, ring, rings.pressures()) for model in (BeamSpringLining, coarse)]
+        refused = [isinstance(answer, str) for answer in pair]
+        assert refused[0] == refused[1], pair
+        for answer in pair:
+            assert isinstance(answer, str) or answer["equilibrium_residual"] < 1e-8
+            assert not isinstance(answer, str) or "no equilibrium" in answer
+        answers.append(refused[0])
+    assert 2 < sum(answers) < 14
+
+
+def coarse(ring):
+    return ContinuumLining(ring, columns=45)

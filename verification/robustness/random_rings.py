@@ -5,7 +5,8 @@ import re
 import numpy as np
 import xarray as xr
 
-from structure import Ground, LiningFailure, Ring
+from structure import Bolts, Ground, LiningFailure, Neighbour, Ring
+from structure.lining import THETA
 
 RADIUS = 3.3
 LINING = dict(outer_diameter=6.6, inner_diameter=5.9, concrete_modulus=34.5e9, concrete_poissons_ratio=0.2)
@@ -110,6 +111,47 @@ def loads_of(degrees, pressure, shear):
         {name: (("time", "theta"), values[None]) for name, values in parts.items()},
         coords={"time": [0.0], "theta": degrees},
     )
+
+
+def growing_load(rng, steps=3):
+    """Four waves of pressure and a shear that ovalises, grown in steps, on a ring of case 3: joints gape and slide."""
+    around = np.radians(THETA)
+    waves = sum(rng.uniform(-2.5e5, 2.5e5) / n * np.cos(n * around - rng.uniform(0, 6.3)) for n in range(2, 6))
+    shear = 1.5e4 * np.sin(2 * around - rng.uniform(0, 6.3))
+    time = np.arange(1, steps + 1) / steps
+    pressure = 3.9e5 * (1 + 0.15 * rng.uniform()) + time[:, None] * waves
+    parts = {"soil_pressure": pressure, "water_pressure": 0 * pressure, "soil_shear": time[:, None] * shear}
+    return xr.Dataset({name: (("time", "theta"), part) for name, part in parts.items()}, {"time": time, "theta": THETA})
+
+
+def extreme_ring(rng, ground):
+    """A ring of 3 to 8 joints that gape, slide or touch point by point, with bolts, leaning faces or a neighbour:
+    stiffnesses from 1e3 to 1e15, friction 0 to 1, slack 0 to 5 mm."""
+    count = int(rng.integers(3, 9))
+    gaps = rng.uniform(20, 60, count)
+    angles = np.sort((np.cumsum(gaps * 360 / gaps.sum()) + rng.uniform(0, 360)) % 360)
+    face = rng.random() < 0.4
+    stiffnesses = ("joint_normal_stiffness", "joint_shear_stiffness", "joint_rotational_stiffness")
+    values = {name: 10 ** rng.uniform(3, 15) for name in stiffnesses[: 2 if face else 3]}
+    values |= {"joint_friction_coefficient": tuple(rng.uniform(0, 1, count)), "joint_contact_only": rng.random() < 0.7}
+    if face or rng.random() < 0.6:
+        values |= {"joint_contact": "face" if face else "section", "joint_contact_height": rng.uniform(0.1, 0.35)}
+    if rng.random() < 0.6:
+        values["joint_bolts"] = tuple(
+            Bolts(
+                offset=rng.uniform(-0.1, 0.1),
+                length=0.4,
+                stiffness=10 ** rng.uniform(6, 10),
+                slack=rng.uniform(0, 5e-3),
+            )
+            for _ in range(count)
+        )
+    if rng.random() < 0.3:
+        values["joint_inclinations"] = tuple(rng.uniform(-10, 10, count))
+    if rng.random() < 0.2:
+        coupling = {f"{way}_stiffness": 10 ** rng.uniform(6, 10) for way in ("radial", "tangential")}
+        values["neighbour"] = Neighbour(rotation=rng.uniform(5, 30), ring_width=1.5, **coupling)
+    return Ring(**LINING, concrete_unit_weight=25e3, joint_angles=tuple(angles), ground=ground, **values)
 
 
 def outcome(model, ring, loads):
