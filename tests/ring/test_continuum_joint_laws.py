@@ -85,7 +85,7 @@ def test_stresses_are_those_of_the_section_beside_a_gaping_joint():
     hoop, outer = field["stress_tt"].values[edge], field["theta"].values[edge]
     section = -answer["axial_force"] / ring.thickness + answer["bending_moment"] * 6 / ring.thickness**2
     away = np.abs((outer[:, None] - np.array(ring.joint_angles) + 180) % 360 - 180).min(axis=1) > 15
-    found = np.interp(outer, THETA, section.values, period=360)
+    found = np.interp(outer, answer["theta"], section.values, period=360)
     assert hoop[away] == pytest.approx(found[away], abs=0.25 * np.abs(found).max())  # points lie inside the outer face
 
 

@@ -179,14 +179,12 @@ def draw():
             left.axvline(angle, color="0.8", lw=0.7, zorder=0)
         left.set(xlabel="angle from the crown [degrees]", ylabel="M [kN m/m]", xlim=(0, 360), xticks=range(0, 361, 60))
         left.legend(fontsize=7)
-        for label, model, style in (
-            ("beam-spring", BeamSpringLining(ring), "-"), ("continuum", ContinuumLining(ring), "--"),
+        for label, model, colour in (
+            ("beam-spring", BeamSpringLining(ring), "0.6"), ("continuum", ContinuumLining(ring), "#c1272d"),
         ):  # fmt: skip
             field = model.contact_field(last).isel(time=0)
             here = field["joint"] == 2
-            right.plot(
-                field["contact_pressure"][here] / 1e6, 1e3 * field["lever"][here], style, color="#c1272d", label=label
-            )
+            right.plot(field["contact_pressure"][here] / 1e6, 1e3 * field["lever"][here], color=colour, label=label)
         right.set(xlabel="pressure in joint 2 [MPa]", ylabel="outward from the centre line [mm]")
         right.legend(fontsize=7)
 
