@@ -146,9 +146,13 @@ class BandedTangent:
         return solve if not failed else None
 
     def _lu(self, coefficients, shift=0.0):
-        """Rows and columns are scaled to a diagonal of one, of which pivots then are shares."""
+        """Rows and columns are scaled to a diagonal of one, of which pivots then are shares.
+
+        Where faces lean, friction may turn the sign of a diagonal.
+        """
         band, width, main = self._assembled(coefficients), self.width, self.main
-        diagonal = band[main].copy()
+        diagonal = np.abs(band[main])
+        diagonal = np.where(diagonal > 0, diagonal, 1.0)
         scale = 1 / np.sqrt(diagonal)
         for offset in range(-width, width + 1):
             columns = np.arange(max(0, -offset), self.size - max(0, offset))

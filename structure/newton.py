@@ -139,7 +139,10 @@ class RingEquilibrium(RingForces):
             close = self.sizes(reached - last).max() < CLOSE * self.sizes(reached).max()
             last = reached
             if close:
-                break
+                try:
+                    return self._newton(loads, last, slip, MAX_DIRECT)
+                except NoEquilibrium:
+                    continue  # rounding in a tangent without symmetry: more rounds get there, too
         return self._newton(loads, last, slip, MAX_DIRECT)
 
     def _newton(self, loads, start, slip, most=MAX_ITERATIONS):
