@@ -1,11 +1,26 @@
-"""Scenes and meshes shared by the tests: built once, changed never."""
+"""Scenes, meshes and events shared by the tests: built once, changed never."""
 
+import os
+import sys
+from pathlib import Path
+
+# Where Python is told to keep no bytecode, as in images of containers, each of the many processes that tests start
+# would compile all libraries anew, for seconds. This comes before they are imported.
+if os.environ.pop("PYTHONDONTWRITEBYTECODE", ""):
+    os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix = str(Path(__file__).parents[1] / ".pytest_cache/bytecode")
+    sys.dont_write_bytecode = False
+
+import pickle
+
+import filelock
 import pytest
 import xarray as xr
 from browser import Browser, find_browser
+from report_study import write_study
 from running import without_simulation
 
 import coupling
+import mpm
 from mpm.mesh import Mesh
 from mpm.meshing import build_mesh
 
@@ -20,6 +35,36 @@ def quick_scene() -> coupling.Scene:
 def quick_mesh(quick_scene: coupling.Scene) -> Mesh:
     """Its mesh, a few thousand triangles."""
     return build_mesh(quick_scene)
+
+
+@pytest.fixture(scope="session")
+def once(tmp_path_factory, worker_id):
+    """Calls a function, of which all processes of the tests share what it returns, by a name."""
+    folder = tmp_path_factory.getbasetemp()
+    folder = folder if worker_id == "master" else folder.parent
+
+    def made(name, make):
+        file = folder / f"{name}.pickle"
+        with filelock.FileLock(f"{file}.lock"):
+            if not file.exists():
+                file.write_bytes(pickle.dumps(make()))
+        return pickle.loads(file.read_bytes())
+
+    return made
+
+
+@pytest.fixture(scope="session")
+def event(once):
+    """The scene `quick` until 60 kg/m have come in, and its records."""
+    scene = coupling.load_scene("quick", stop={"inflow_mass": 60.0, "time": 2.0})
+    return scene, once("quick-60", lambda: list(mpm.simulate(scene)))
+
+
+@pytest.fixture(scope="session")
+def gates(once, tmp_path_factory):
+    """Folder of the study of two gates and two soils, answered by both lining models; to be copied."""
+    with pytest.MonkeyPatch.context() as patch:
+        return once("gates", lambda: write_study(tmp_path_factory.mktemp("gates"), patch))
 
 
 @pytest.fixture(scope="module")

@@ -178,7 +178,7 @@ def test_command_finds_the_friction_angle_of_a_run_and_runs_nothing_twice(tmp_pa
     rows.append("inflow_mass,,9,,1,kg/m,1")  # after the end
     (tmp_path / "field.csv").write_text("quantity,place,time,inflow_mass,value,unit,error\n" + "\n".join(rows) + "\n")
     (tmp_path / "priors.toml").write_text(
-        'samples = 8\nrecords = 5\ndraws = 512\n[fixed]\n"limits.convergence_per_mille" = 1.0\n'
+        'samples = 8\nrecords = 3\ndraws = 512\n[fixed]\n"limits.convergence_per_mille" = 1.0\n'
         '"ring.n_elements" = 72\n[parameters]\n'
         '"soils.0.friction_angle" = {low = 25.0, high = 37.0}\n'
     )
@@ -196,7 +196,13 @@ def test_command_finds_the_friction_angle_of_a_run_and_runs_nothing_twice(tmp_pa
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"ensemble", "fit.nc", "fit.png"}
     with xr.open_dataset(data["data"], engine="h5netcdf", decode_timedelta=False) as stored:
         assert stored["inflow_mass"].sel(knowledge="posterior").isel(time=-1).std() < 1e-6  # no parameter moves it
-    assert len(begun) == 8 and gush(*words).exit_code == 0 and len(begun) == 8
+    assert len(begun) == 8
+
+    def stopped(*arguments):
+        raise KeyboardInterrupt  # all that comes after the runs is as it was
+
+    monkeypatch.setattr(import_module("coupling.fits.fit"), "fitted", stopped)
+    assert gush(*words).exit_code == 130 and len(begun) == 8
 
 
 def test_runs_that_end_too_early_are_refused(plan):

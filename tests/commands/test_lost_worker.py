@@ -1,25 +1,18 @@
 """A real study on a dask scheduler with two workers, one killed in the middle; the benchmark does 64 runs."""
 
-import json
-import subprocess
-import sys
-from pathlib import Path
-
+import numpy as np
 import pytest
+
+import coupling
+from verification.robustness.lost_worker import MEASURED, killed_study, plan
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parents[2]
 
-
-def test_study_with_a_killed_worker_equals_the_serial_one():
-    result = subprocess.run(
-        [sys.executable, "-m", "verification.robustness.lost_worker", "4", "--print-only"],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-    )
-    assert result.returncode == 0, result.stdout + result.stderr
-    data = json.loads(result.stdout)
-    assert data["workers_killed"] == 1 and data["finished"] == data["told_done"] == 4
-    assert data["different_variables"] == []
+def test_study_with_a_killed_worker_equals_the_serial_one(tmp_path):
+    parallel, lines, killed = killed_study(4, tmp_path / "parallel")
+    assert len(killed) == 1 and parallel["status"].values.tolist() == ["finished"] * 4
+    assert sum(line.endswith("done") for line in lines) == 4
+    serial = coupling.study(plan(4), tmp_path / "serial", workers=0).load()
+    for name in set(serial.data_vars) - set(MEASURED):
+        np.testing.assert_array_equal(parallel[name], serial[name], err_msg=name)

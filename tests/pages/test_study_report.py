@@ -18,7 +18,7 @@ from page_in_browser import (
     wider_than_the_screen,
     written_as,
 )  # fmt: skip
-from report_study import REASON, write_study
+from report_study import REASON
 from typer.testing import CliRunner
 
 import coupling
@@ -34,9 +34,8 @@ CASES = [0, 1, 2]  # the fourth one fails
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        yield write_study(tmp_path_factory.mktemp("gates"), patch)
+def folder(gates, tmp_path_factory):
+    return shutil.copytree(gates, tmp_path_factory.mktemp("study") / "gates")
 
 
 @pytest.fixture(scope="module")

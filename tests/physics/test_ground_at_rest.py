@@ -59,7 +59,7 @@ def test_lining_carries_the_uplift_of_the_displaced_ground(closed_case_3):
 
 
 def test_ground_with_a_rough_lining_stays_at_rest():
-    source = coupling.load_scene("quick")
+    source = coupling.load_scene("quick", discretisation=COARSE)
     rough = source.tunnels[0].model_copy(update={"friction_coefficient": 0.6})  # K0 shear needs 0.44
     scene = source.model_copy(update={"tunnels": (rough,)})
     solver = mpm.Solver(scene, mpm.build_mesh(scene))

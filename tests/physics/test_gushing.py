@@ -20,12 +20,6 @@ def quick(**changes):
     return coupling.load_scene("quick").model_copy(update=changes)
 
 
-@pytest.fixture(scope="module")
-def event():
-    scene = quick(stop=mpm.scene.Stop(inflow_mass=60.0, time=2.0))
-    return scene, list(mpm.simulate(scene))
-
-
 def test_inflow_grows_and_grains_are_conserved(event):
     _, records = event
     inflow = [r.inflow_mass for r in records]
@@ -66,13 +60,13 @@ def test_result_has_the_same_bits_for_any_number_of_threads_and_of_steps_at_once
         solver.relax()
         solver.open_gate()
         batches.append(0)
-        while solver.time < 0.3:
-            limits = solver.advance(0.3, most_substeps)
+        while solver.time < 0.1:
+            limits = solver.advance(0.1, most_substeps)
             assert limits and set(limits) <= {"acoustic", "advective", "output"}
             batches[-1] += 1
         solvers.append(solver)
     assert len(mesh.elements) > mpm.solver.SMALLEST_PARALLEL  # else the other runs were serial too
-    assert batches[0] == solvers[0].long_step_count >= 75
+    assert batches[0] == solvers[0].long_step_count >= 25
     assert batches[0] > batches[2] > batches[1]
     for other in solvers[1:]:
         assert other.long_step_count == solvers[0].long_step_count and other.time == solvers[0].time

@@ -1,10 +1,12 @@
 """Error against run time: orders, fronts and extrapolation by hand, a ladder over a problem with a known error."""
 
 import json
+from importlib import import_module
 
 import numpy as np
 import pytest
 import xarray as xr
+from report_study import synthetic_run
 from running import gush
 
 import coupling
@@ -14,7 +16,6 @@ from verification.problems.problem import Problem, Result
 from verification.sensitivity.inflow import error_bars, measured_table, spread
 from verification.sensitivity.mesh import scene_ladder, write_ladder
 from verification.sensitivity.variants import meshes
-from verification.small_event import COARSE
 
 
 def solve(cells=8, courant=0.5, friction_angle=30.0):
@@ -119,13 +120,20 @@ def test_page_of_a_mesh_ladder_says_value_and_error_bar(tmp_path):
 
 
 @pytest.mark.slow
-def test_mesh_ladder_of_a_scene_runs_its_meshes_once(tmp_path):
-    mesh = {f"{name} = {value}" for name, value in COARSE.items()}
-    file = tmp_path / "coarse.toml"
-    file.write_text('base = "quick"\nname = "coarse"\n[discretisation]\n' + "\n".join(sorted(mesh)) + "\n")
-    lines = []
+def test_mesh_ladder_of_a_scene_runs_its_meshes_once(tmp_path, monkeypatch):
+    sizes, lines = [], []
+
+    def run(scene, folder, **options):
+        sizes.append(scene.discretisation.element_size)
+        synthetic_run(scene, folder, **options)
+
+    monkeypatch.setattr(import_module("coupling.runs.run"), "run", run)
+    monkeypatch.setattr("verification.sensitivity.mesh.draw", lambda state, path: None)  # drawn by the test above
+    study = coupling.study
+    monkeypatch.setattr(coupling, "study", lambda plan, out, **options: study(plan, out, **{**options, "workers": 0}))
     for _ in range(2):
-        written = scene_ladder(str(file), 5.0, tmp_path / "out", lines.append, factors=(1.0, 0.9, 0.8))
+        written = scene_ladder("quick", 300.0, tmp_path / "out", lines.append, factors=(1.0, 0.9, 0.8))
+    np.testing.assert_allclose(sizes, 1.5 * np.array([1.0, 0.9, 0.8]))
     assert sum(line.endswith("done") for line in lines) == 3
     with xr.open_dataset(written["data"], engine="h5netcdf") as stored:
         assert stored.sizes == {"mesh": 3, "inflow_mass": 5, "quantity": len(stored["quantity"])}
