@@ -16,6 +16,7 @@ import filelock
 import pytest
 import xarray as xr
 from browser import Browser, find_browser
+from matplotlib.figure import Figure
 from report_study import write_study
 from running import without_simulation
 
@@ -85,6 +86,12 @@ def opened(report, browser):
     browser.open(report)
     yield browser
     assert browser.complaints == []
+
+
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Figures are made, and their files stay empty: for tests of what else a command does."""
+    monkeypatch.setattr(Figure, "savefig", lambda figure, path, **options: Path(path).touch())
 
 
 @pytest.fixture

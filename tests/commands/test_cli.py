@@ -50,6 +50,7 @@ def test_run_writes_everything_and_prints_a_table(simulated, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("undrawn")
 def test_poor_error_is_a_warning_with_a_remedy_in_the_run_its_log_and_its_report(simulated, tmp_path, monkeypatch):
     from coupling.postprocess.quality import ERRORS
 
@@ -81,6 +82,7 @@ def test_values_of_the_scene_are_set_on_the_command_line(simulated, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("undrawn")
 def test_ring_that_fails_leaves_the_pictures_of_the_ground_and_says_what_failed(simulated, tmp_path):
     (tmp_path / "loose.toml").write_text(
         'base = "quick"\n[ring]\njoint_rotational_stiffness = 0.0\njoint_normal_stiffness = 0.0\n'
@@ -125,6 +127,7 @@ def test_default_folder_is_numbered_when_taken(simulated, tmp_path, monkeypatch)
     assert str(default_folder("case-3")) == os.path.join("runs", "case-3")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_folder_in_use_is_refused(simulated, tmp_path):
     with claimed(tmp_path / "a"):
         result = gush("run", "quick", "--out", tmp_path / "a", "--overwrite")
@@ -182,6 +185,7 @@ def test_too_little_memory_is_refused(monkeypatch):
         check_memory(make_quick_scene())
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_failed_run_keeps_its_output_and_says_where(simulated, tmp_path):
     simulated.ending = mpm.RunFailed("a material point became non-finite", 0.2, (1.0, -20.0))
     result = gush("run", "quick", "--out", tmp_path / "a")

@@ -65,6 +65,7 @@ def test_linear_stability_tells_how_far_it_is(monkeypatch, impatient):
     assert "linear analysis: 1 of 900" in result.stderr and "linear analysis: 3 of 900" in result.stderr
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_forces_in_the_ring_need_no_pictures(simulated, tmp_path):
     assert gush("run", "quick", "--out", tmp_path / "plain", "--no-figures").exit_code == 0
     assert read_response(tmp_path / "plain").sizes["time"] == 3

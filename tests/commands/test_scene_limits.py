@@ -128,6 +128,7 @@ def test_run_draws_its_checks(folder, tmp_path):
     assert "checks.png" in names
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_response_again_keeps_the_limits_of_the_scene_and_others_take_their_place(folder, tmp_path):
     result = gush("respond", folder)
     assert result.exit_code == 0 and "bearing of" in result.output and "passes 1" in result.output

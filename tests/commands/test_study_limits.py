@@ -26,13 +26,8 @@ def folder(tmp_path_factory):
     """Two gates and two soils; a limit between the least and the largest convergence of the cases."""
     place = tmp_path_factory.mktemp("limits")
     cases = {"gate.angle": [90.0, 45.0], "soils.0.friction_angle": [25.0, 30.0]}
+    fixed = {"stop.inflow_mass": 300.0, "limits.convergence_per_mille": 1.87}  # the cases come to 1.82 to 1.94
     with pytest.MonkeyPatch.context() as monkeypatch:
-        free = write_study(place / "free", monkeypatch, backends=("beam-spring",), parameters=cases)
-        larger = [np.maximum(*(abs(read_response(run)[f"convergence_{way}"]) for way in ("horizontal", "vertical")))
-                  for run in folders(free)]  # fmt: skip
-        reached = [1e3 * one.max().item() / 6.6 for one in larger]
-        middle = (min(reached) + max(reached)) / 2
-        fixed = {"stop.inflow_mass": 300.0, "limits.convergence_per_mille": middle}
         return write_study(place / "checked", monkeypatch, backends=("beam-spring",), fixed=fixed, parameters=cases)
 
 

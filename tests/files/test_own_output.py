@@ -24,6 +24,7 @@ def contents(folder):
     return {path: hashlib.sha256(path.read_bytes()).hexdigest() for path in Path(folder).rglob("*") if path.is_file()}
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_comparison_leaves_the_run_as_it_is(folder, tmp_path):
     before = contents(folder)
     result = gush("compare", folder, "--open-gate", "0.17", "--out", tmp_path / "compared")
@@ -34,6 +35,7 @@ def test_comparison_leaves_the_run_as_it_is(folder, tmp_path):
         assert stored.attrs["gate_cut"] == 0.17
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_response_to_own_pressures_leaves_their_file_as_it_is(written, tmp_path):
     (tmp_path / "limits.toml").write_text(LIMITS)
     before = contents(tmp_path)
@@ -47,6 +49,7 @@ def test_response_to_own_pressures_leaves_their_file_as_it_is(written, tmp_path)
     assert report.exit_code == 2 and "mine.nc" in report.output, report.output
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_response_of_another_ring_does_not_take_the_place_of_the_runs_own(folder, tmp_path):
     own = read_response(folder)["bending_moment"]
     other = tmp_path / "stiff.toml"
@@ -57,6 +60,7 @@ def test_response_of_another_ring_does_not_take_the_place_of_the_runs_own(folder
         assert float(abs(stored["bending_moment"] - own.values).max()) > 1e3
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_response_asks_before_it_replaces(written, tmp_path):
     target = tmp_path / "mine-beam-spring.nc"
     target.write_text("somebody's")
@@ -68,6 +72,7 @@ def test_response_asks_before_it_replaces(written, tmp_path):
     assert own.exit_code == 2 and "must not be the file of the pressures" in own.output
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_comparison_replaces_earlier_comparisons_only(written, tmp_path):
     out = tmp_path / "out"
     out.mkdir()

@@ -155,6 +155,7 @@ def test_knobs_that_remedies_name_are_of_the_scene():
             assert hasattr(getattr(scene, table), knob), knob
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_quality_is_in_the_file_the_log_and_the_line(simulated, tmp_path):
     folder = tmp_path / "run"
     run(make_quick_scene(), folder, figures=True)

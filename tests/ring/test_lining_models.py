@@ -39,6 +39,7 @@ def test_models_are_found_by_name():
         structure.register_lining_model("continuum", structure.BeamSpringLining)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_example_of_the_documentation_is_a_model(example, written, tmp_path):
     assert structure.lining_model("efficiency") is example
     response = structure.lining_model("efficiency")(ring()).respond(pressures())
@@ -51,6 +52,7 @@ def test_example_of_the_documentation_is_a_model(example, written, tmp_path):
     assert json.loads(result.stdout)["models"] == ["beam-spring", "efficiency"]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_model_in_a_file_of_your_own_answers_on_the_command_line(example, written, tmp_path, monkeypatch):
     monkeypatch.setattr(models, "_REGISTERED", {})
     code = re.search(r"## A model of your own.*?```python\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.S)[1]
@@ -133,6 +135,7 @@ def test_comparison_of_a_file_written_by_hand(written, tmp_path):
         assert differences["bending_moment"].attrs["units"] == "N m/m"
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_run_keeps_the_responses_of_both_models(simulated, tmp_path):
     folder = tmp_path / "a"
     run(make_quick_scene(), folder)
@@ -146,6 +149,7 @@ def test_run_keeps_the_responses_of_both_models(simulated, tmp_path):
     assert (folder / "comparison" / "differences.nc").is_file()
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_open_gate_changes_the_continuum_only(written, tmp_path):
     whole, hole = tmp_path / "whole.json", tmp_path / "hole.json"
     assert gush("compare", written, "--json", whole).exit_code == 0

@@ -88,6 +88,7 @@ def test_a_tunnel_of_another_diameter_has_a_ring_of_its_own(run):
     np.testing.assert_array_equal(answered["bending_moment"], alone["bending_moment"])
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_commands_answer_for_all_tunnels(run, tmp_path):
     copy = shutil.copytree(run, tmp_path / "run")
     done = gush("respond", copy, "--backend", "continuum", "--json", "-")

@@ -88,6 +88,7 @@ def theoretical_shear(scene):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("undrawn")  # the page draws the same figures
 def test_figures_command_draws_a_study(rehearsal, tmp_path):
     folder, _ = rehearsal
     result = gush("figures", folder / "unknowns", "--out", tmp_path / "figures")
