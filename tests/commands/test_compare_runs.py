@@ -14,6 +14,8 @@ from coupling.refused import Refused
 from coupling.studies.side_by_side import side_by_side
 from verification import synthetic_run
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):

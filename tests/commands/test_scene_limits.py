@@ -123,6 +123,7 @@ def test_response_of_a_run_is_held_against_the_limits_of_its_scene(scene, folder
     assert "inflow_mass" in found["bending_moment_utilisation"]["at"]
 
 
+@pytest.mark.slow
 def test_run_draws_its_checks(folder, tmp_path):
     names = {path.name for path in draw_run(folder, tmp_path)}
     assert "checks.png" in names

@@ -14,6 +14,8 @@ from coupling.studies.limits import limits_of_case, limits_of_study
 from structure import additional, utilisations
 from structure.limits import CHECK_VARIABLES
 
+pytestmark = pytest.mark.slow
+
 CONVERGENCE = "convergence_utilisation"
 
 

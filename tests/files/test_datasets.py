@@ -130,6 +130,7 @@ def test_other_files_get_a_clear_error(tmp_path):
         datasets.read_pressures(tmp_path / "..")
 
 
+@pytest.mark.slow
 def test_killed_writer_leaves_a_readable_file(tmp_path):
     path = tmp_path / "run.nc"
     code = f"""

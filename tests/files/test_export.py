@@ -198,6 +198,7 @@ def test_excel_file_has_the_tables_as_sheets(folder, tmp_path):
     np.testing.assert_array_equal(sheets["history"]["time [s]"], TIMES)
 
 
+@pytest.mark.slow
 def test_pictures_are_exported_as_vectors(folder, tmp_path):
     files = export(folder, "svg", tmp_path)
     assert {"pressures.svg", "internal_forces.svg", "inflow.svg"} <= {path.name for path in files}

@@ -281,6 +281,7 @@ def test_command_prints_residuals_and_writes_dataset_and_picture(run, tmp_path):
     assert unknown.exit_code == 2 and "beam-spring, continuum" in unknown.output
 
 
+@pytest.mark.slow
 def test_every_quantity_can_be_read_of_a_run(run):
     from coupling.measurements.quantities import computed
 

@@ -49,6 +49,7 @@ def test_one_record_is_that_of_the_whole(torn, row):
     xr.testing.assert_identical(one, read_group_at_once(torn, "inner").isel(time=row))
 
 
+@pytest.mark.slow
 def test_every_group_of_a_run_is_read_as_by_xarray(tmp_path):
     run = write_run(tmp_path / "run.nc", times=(0.0, 0.5), models=("beam-spring",))
     tree = coupling.read_run(run)

@@ -72,6 +72,7 @@ def test_response_asks_before_it_replaces(written, tmp_path):
     assert own.exit_code == 2 and "must not be the file of the pressures" in own.output
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
 def test_comparison_replaces_earlier_comparisons_only(written, tmp_path):
     out = tmp_path / "out"

@@ -92,6 +92,7 @@ def test_inflow_that_pauses_can_be_selected_all_the_same(run):
     assert float(over.sel(inflow_mass=25.0, method="nearest")["time"]) == 0.75
 
 
+@pytest.mark.slow
 def test_units_are_those_that_pint_knows(file):
     """In a process of its own: nothing else may have taught pint other units."""
     code = f"""

@@ -181,6 +181,7 @@ def test_mesh_is_drawn_around_the_tunnel_and_around_the_gate(run):
     assert [len(axis.collections[0].get_paths()) for axis in figure.axes] == [2, 2]
 
 
+@pytest.mark.slow
 def test_all_pictures_of_a_run_are_written(run, tmp_path):
     written = figures.draw_run(run, tmp_path / "figures")
     assert [path.name for path in written] == [
@@ -189,6 +190,7 @@ def test_all_pictures_of_a_run_are_written(run, tmp_path):
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in written)
 
 
+@pytest.mark.slow
 def test_drawing_leaves_pyplot_alone():
     code = "import sys, coupling.figures; sys.exit('matplotlib.pyplot' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

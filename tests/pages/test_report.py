@@ -72,6 +72,7 @@ def test_initial_theory_is_given_only_where_it_holds(quick_scene):
     assert trust.initial_theory(coupling.load_scene("twin-tunnels"), theta) is None
 
 
+@pytest.mark.slow
 def test_leading_model_is_the_runs_own_or_the_one_asked_for_whichever_was_written_last(tmp_path):
     file = write_run(tmp_path / "run.nc", models=("continuum", "beam-spring"))
     own = {name: float(datasets.read_response(file, name)["bending_moment"].isel(time=-1).max()) for name in

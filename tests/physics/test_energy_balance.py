@@ -58,6 +58,7 @@ class Audited(mpm.Solver):
             self.covariance += float(np.sum(change * self.nodes[water]))
 
 
+@pytest.mark.slow
 def test_energy_lost_by_pure_flip_is_spread_over_points_less_what_water_they_take_up():
     scene = small_scene(numerics={"pic_rate": 0.0, "local_time_stepping": False})
     solver = Audited(scene, mpm.build_mesh(scene), threads=1)

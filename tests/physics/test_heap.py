@@ -1,6 +1,7 @@
 """Material that falls inside a tunnel: it lands, comes to rest, and takes up the area that its grains need."""
 
 import numpy as np
+import pytest
 
 from coupling.postprocess import filled
 from mpm.fields import values
@@ -43,6 +44,7 @@ def dropped_block(width=1.6, size=0.1):
     return solver
 
 
+@pytest.mark.slow
 def test_dropped_block_lands_and_takes_up_the_area_its_grains_need():
     solver = dropped_block()
     mass = np.sum(solver.points["grain_mass"])

@@ -52,6 +52,7 @@ def test_example_of_the_documentation_is_a_model(example, written, tmp_path):
     assert json.loads(result.stdout)["models"] == ["beam-spring", "efficiency"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
 def test_model_in_a_file_of_your_own_answers_on_the_command_line(example, written, tmp_path, monkeypatch):
     monkeypatch.setattr(models, "_REGISTERED", {})
@@ -135,6 +136,7 @@ def test_comparison_of_a_file_written_by_hand(written, tmp_path):
         assert differences["bending_moment"].attrs["units"] == "N m/m"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
 def test_run_keeps_the_responses_of_both_models(simulated, tmp_path):
     folder = tmp_path / "a"
@@ -149,6 +151,7 @@ def test_run_keeps_the_responses_of_both_models(simulated, tmp_path):
     assert (folder / "comparison" / "differences.nc").is_file()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
 def test_open_gate_changes_the_continuum_only(written, tmp_path):
     whole, hole = tmp_path / "whole.json", tmp_path / "hole.json"
