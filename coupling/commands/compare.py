@@ -63,7 +63,7 @@ def store(comparison, source, out=None):
 
 
 def store_runs(compared, folder):
-    """Write the states of runs side by side, and at equal inflow mass the page about them; returns a dict of paths."""
+    """Write the states of runs side by side and the page about them; returns a dict of paths."""
     from coupling.datasets import write_dataset
     from coupling.report.page import write_runs_report
     from coupling.studies.side_by_side import TITLE
@@ -71,9 +71,7 @@ def store_runs(compared, folder):
     data, page = folder / STATES, folder / REPORT_FILE
     claim(folder, (data, page), STATES, TITLE)
     write_dataset(data, compared.dataset())
-    # the slider of the page moves along the inflow mass
-    report = str(write_runs_report(compared, page)) if compared.along == "inflow_mass" else None
-    return {"data": str(data), "report": report}
+    return {"data": str(data), "report": str(write_runs_report(compared, page))}
 
 
 def compare_command(
@@ -96,7 +94,7 @@ def compare_command(
     scene: RingScene = None,
     along: Annotated[
         str | None,
-        typer.Option(help="Of several runs: equal inflow_mass or equal time; inflow_mass, with a page, when left out."),
+        typer.Option(help="Of several runs: equal inflow_mass or equal time; inflow_mass when left out."),
     ] = None,
     out: Annotated[
         Path | None,

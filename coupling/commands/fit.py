@@ -33,7 +33,7 @@ def fit_command(
     JSON: `scene`, `measurements`, `runs`, `failed`, `count`, `not_reached`, `chi_square`, `probability` (of the closest
     draw); `parameters`, `predictions` (at `time` [s]): name to unit, prior and posterior, each low, median, high
     (90 %); `limits`: name to share_passing, passing_time [s] (null: not by then); `emulators`: quantity to error,
-    explained, standardised (of leave-one-out); `sensitivity`: quantity to parameter to first_order, total_order;
+    explained, standardised (of runs left out); `sensitivity`: quantity to parameter to first_order, total_order;
     `data`, `figure`.
     """
     with answering(json_path) as answer:
@@ -94,7 +94,8 @@ def _tables(data):
         times = (one["passing_time"][end] for end in ("low", "median", "high"))
         told = (f"{time:.3g} s" if time != float("inf") else "later or never" for time in times)
         limits.add_row(one["label"], f"{one['share_passing']:.0%}", *told)
-    emulators = Table("emulator", "error", "variance explained", "error over its own", title="leave-one-out")
+    heads = ("emulator", "error", "variance explained", "error over its own")
+    emulators = Table(*heads, title="cross-validation: an eighth of the runs left out in turn")
     for name, one in data["emulators"].items():
         error = f"{one['scale'] * one['error']:.3g} {one['unit']}"
         emulators.add_row(name.replace("_", " "), error, f"{one['explained']:.1%}", f"{one['standardised']:.2f}")

@@ -13,7 +13,8 @@ from coupling.postprocess.settlement import gauss
 if TYPE_CHECKING:
     import xarray as xr
 
-WIDTHS = 6.0  # half the width of the view, in widths i of the trough
+WIDTHS = 6.0  # at most half the width of the view, in widths i of the trough; it ends where the surface does
+MARGIN = 0.02  # of the view, on each side
 
 
 def settlement_trough(settlement: xr.DataArray, trough: xr.Dataset) -> Picture:
@@ -25,7 +26,8 @@ def settlement_trough(settlement: xr.DataArray, trough: xr.Dataset) -> Picture:
     trough : xarray.Dataset
         Both as of :func:`coupling.postprocess.answer.settled`.
     """
-    x, down = settlement["x"].values, 1e3 * settlement.isel(time=-1).values
+    now = settlement.isel(time=-1).dropna("x")
+    x, down = now["x"].values, 1e3 * now.values
     last = {name: float(trough[name][-1]) for name in trough.data_vars}
     told = f"largest {1e3 * last['largest']:.3g} mm, volume loss {100 * last['volume_loss']:.3g} %"
     with matplotlib.rc_context(STYLE):
@@ -38,8 +40,8 @@ def settlement_trough(settlement: xr.DataArray, trough: xr.Dataset) -> Picture:
             curve = 1e3 * gauss(along, last["peak"], centre, width)
             axis.plot(along, curve, "-", color=GATE, lw=1.2, label="Gauss curve (Peck 1969)")
             axis.axvspan(centre - width, centre + width, color="0.94", lw=0, label=f"width i = {width:.3g} m", zorder=0)
-            half = min(WIDTHS * width, float(np.abs(x - centre).max()))
-            axis.set_xlim(centre - half, centre + half)
+            left, right = max(x[0], centre - WIDTHS * width), min(x[-1], centre + WIDTHS * width)
+            axis.set_xlim(left - MARGIN * (right - left), right + MARGIN * (right - left))
             told += f"\ni is {last['width_over_depth']:.2g} of the depth of the axis; curve off by "
             told += f"{1e3 * last['error']:.2g} mm (root mean square), R² {last['r_squared']:.2f}"
         axis.axhline(0.0, color=INITIAL, lw=0.6)

@@ -72,7 +72,7 @@ def fit(
         Over knowledge ("prior", "posterior") and level (share of the distribution below): parameter_value (..,
         parameter); NAME (.., time), bands of quantities of the runs, the error of the emulator in them; passing_time
         (.., limit) [s], infinite beyond the last time, share_passing (knowledge, limit) [-]. Of the emulators by
-        leave-one-out: measured_error, in its unit, measured_explained, measured_standardised [-] (measurement) and
+        cross-validation: measured_error, in its unit, measured_explained, measured_standardised [-] (measurement) and
         NAME_error, NAME_explained, NAME_standardised (time). first_order, total_order (quantity, parameter): Sobol
         indices of the quantities at the last time under the prior. draw_value (draw, parameter). Measurements as of
         :func:`coupling.measurements.misfit` (time and inflow_mass as measured_time, measured_inflow_mass), `computed`

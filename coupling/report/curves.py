@@ -102,20 +102,19 @@ def budget(states, count, most, detail):
     return step, evenly(records, max(2, min(most, int(affordable * step))))
 
 
-def slider_stops(entries, records):
-    """Inflow masses that the slider stops at: all that any entry has, ascending, (n,) float64 [kg/m]."""
-    masses = np.concatenate([states["inflow_mass"].values[records] for states in entries])
-    masses = np.unique(np.round(masses, 9))
-    masses = masses[np.isfinite(masses)]
-    return masses[evenly(len(masses), MOST_STOPS)]
+def slider_stops(entries, records, along="inflow_mass"):
+    """Inflow masses [kg/m] or times [s] that the slider stops at: all that any entry has, ascending, (n,) float64."""
+    places = np.unique(np.round(np.concatenate([states[along].values[records] for states in entries]), 9))
+    places = places[np.isfinite(places)]
+    return places[evenly(len(places), MOST_STOPS)]
 
 
-def rows_at(states, records, stops):
-    """Row of the curves at every stop of the slider: that of the nearest inflow mass, -1 beyond what was reached."""
-    masses = states["inflow_mass"].values
+def rows_at(states, records, stops, along="inflow_mass"):
+    """Row of the curves at every stop of the slider: that of the nearest place, -1 beyond what was reached."""
+    places = states[along].values
     reached = int(np.flatnonzero(np.isfinite(states["time"].values))[-1])  # time is unknown beyond
-    rows = np.array([int(np.argmin(np.abs(masses[records] - stop))) for stop in stops])
-    beyond = (stops > masses[reached] * (1 + 1e-6)) & (records[rows] >= reached) | (records[rows] > reached)
+    rows = np.array([int(np.argmin(np.abs(places[records] - stop))) for stop in stops])
+    beyond = (stops > places[reached] * (1 + 1e-6)) & (records[rows] >= reached) | (records[rows] > reached)
     return np.where(beyond, -1, rows)
 
 

@@ -77,7 +77,6 @@ def write_runs_report(compared: SideBySide, out: str | Path) -> Path:
     Parameters
     ----------
     compared : coupling.studies.side_by_side.SideBySide
-        Along the inflow mass.
     out : str or path
         The HTML file; an earlier report is replaced, nothing else.
 

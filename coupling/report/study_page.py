@@ -29,6 +29,8 @@ from structure.models import model_name
 MOST_VALUES_NAMED = 6  # of a fact that differs between the cases
 MOST_CASES, MOST_RECORDS, MOST_WARNINGS = 60, 121, 6
 NOT_RUN = "not run yet; repeat `gush study`"
+#: What the slider moves along: its place, several of them, their unit.
+ALONG = {"inflow_mass": ("inflow mass", "inflow masses", "kg/m"), "time": ("time", "times", "s")}
 
 
 def collect(folder, beside, model=None):
@@ -96,7 +98,7 @@ def collect_runs(compared, beside):
     Parameters
     ----------
     compared : coupling.studies.side_by_side.SideBySide
-        Along the inflow mass.
+        Along the inflow mass, or along time: so moves the slider, too.
     beside : path
         Folder of the page.
     """
@@ -105,15 +107,16 @@ def collect_runs(compared, beside):
     done = [_row(case, whole[case.index], answers[case.index], None, file.parent, Path(beside))
             for case, file in zip(compared.cases, compared.files, strict=True)]  # fmt: skip
     chosen = [compared.cases[k] for k in evenly(len(compared.cases), MOST_CASES)]
-    records = whole[0].sizes["progress"]
-    player, notes = _player(whole, answers, chosen, records)
+    records, along = whole[0].sizes["progress"], compared.along
+    player, notes = _player(whole, answers, chosen, records, along)
+    place, places, unit = ALONG[along]
     design = [(case.parameters["run"], str(file)) for case, file in zip(compared.cases, compared.files, strict=True)]
-    last = shown(float(whole[0]["inflow_mass"][-1]))
+    last = f"{shown(float(whole[0][along][-1]))} {unit}"
     model = str(whole[0]["model"].values[0]) if "model" in whole[0].dims else None
     limits = _found_limits(done, whole, model)
     return {
         "title": f"Gushing into a tunnel: {len(done)} runs side by side",
-        "lead": f"Compared at equal inflow mass, to {last} kg/m, which all of them reached.",
+        "lead": f"Compared at equal {place}, to {last}, which all of them reached.",
         "status": ("finished", f"{len(done)} runs"),
         "warnings": _warnings(done, []),
         "notes": notes,
@@ -121,7 +124,7 @@ def collect_runs(compared, beside):
         "attributes": whole[0].attrs,
         "made": f"first run of {whole[0].attrs.get('created', 'unknown time')}",
         "design_title": "What is compared",
-        "design": [*design, ("compared at", f"{records} inflow masses")],
+        "design": [*design, ("compared at", f"{records} {places}")],
         "scene_of_cases": _shared_facts(compared.cases),
         "lost": [],
         "done": done,
@@ -132,7 +135,7 @@ def collect_runs(compared, beside):
     }
 
 
-def _player(whole, answers, chosen, available):
+def _player(whole, answers, chosen, available, along="inflow_mass"):
     """What the script draws, and what of it is left out as sentences."""
     if not chosen:
         return {"entries": [], "fields": None, "mesh": None}, []
@@ -141,21 +144,21 @@ def _player(whole, answers, chosen, available):
     widest = max(states.values(), key=lambda one: one.sizes.get("model", 0))
     detail = len(chosen) <= MOST_IN_DETAIL
     step, records = budget(widest, len(chosen), MOST_RECORDS, detail)
-    stops, notes = slider_stops(list(states.values()), records), []
+    stops, notes, (_, places, unit) = slider_stops(list(states.values()), records, along), [], ALONG[along]
     if step > 1:
         notes.append(f"Curves around the ring show every {step}. value; extremes are taken from all of them.")
     if len(records) < available:
-        notes.append(f"Curves around the ring are shown at {len(records)} of {available} inflow masses.")
+        notes.append(f"Curves around the ring are shown at {len(records)} of {available} {places}.")
     entries = [{
         "number": case.index,
         "label": case.name,
         "gate": None if case.scene.gate is None else case.scene.gate.angle,
-        "at": rows_at(states[case.index], records, stops).tolist(),
+        "at": rows_at(states[case.index], records, stops, along).tolist(),
         **entry(states[case.index], answers[case.index], records, step, detail),
     } for case in chosen]  # fmt: skip
-    told = [f"{shown(float(mass))} kg/m" for mass in stops]
+    told = [f"{shown(float(stop))} {unit}" for stop in stops]
     return {
-        "stops": {"along": "inflow_mass", "values": stops, "told": told},
+        "stops": {"along": along, "values": stops, "told": told},
         "theta": widest["theta"].values[::step].tolist(),
         "entries": entries,
         "fields": None,

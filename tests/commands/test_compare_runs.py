@@ -11,6 +11,7 @@ from running import gush
 from coupling.datasets import read_response
 from coupling.postprocess import at_inflow
 from coupling.refused import Refused
+from coupling.report.study_page import collect_runs
 from coupling.studies.side_by_side import side_by_side
 from verification import synthetic_run
 
@@ -83,8 +84,22 @@ def test_command_prints_rows_and_writes_states_and_one_page(folder, tmp_path):
     with xr.open_dataset(out / "runs.nc", engine="h5netcdf") as stored:
         assert stored["soil_pressure"].sizes["run"] == 3
     assert before == [(run / "run.nc").read_bytes() for run in runs]
-    timed = gush("compare", *runs, "--along", "time", "--out", out)
+    timed = gush("compare", *runs, "--along", "time", "--out", out, "--json", tmp_path / "b.json")
     assert timed.exit_code == 0, timed.output
+    assert json.loads((tmp_path / "b.json").read_text())["report"] == str(out / "report.html")
+    page = (out / "report.html").read_text()
+    assert "Compared at equal time, to 1 s" in page and "Cases at this time" in page and "inflow masses" not in page
+
+
+def test_slider_of_runs_at_equal_time_stops_at_times_and_curves_are_those_of_the_runs(folder, tmp_path):
+    compared = side_by_side([folder / "base", folder / "slow"], "time", records=5)
+    player = collect_runs(compared, tmp_path)["player"]
+    assert player["stops"]["along"] == "time" and player["stops"]["told"][-1] == "1 s"
+    np.testing.assert_allclose(player["stops"]["values"], [0.0, 0.25, 0.5, 0.75, 1.0])
+    for one, states in zip(player["entries"], compared.states, strict=True):
+        assert one["at"] == [0, 1, 2, 3, 4]
+        pressure, level = states["water_pressure"].values, np.ptp(states["water_pressure"].values) / 6e4
+        np.testing.assert_allclose(one["curves"]["water_pressure"].values(), pressure, rtol=0, atol=level)
 
 
 @pytest.mark.parametrize(

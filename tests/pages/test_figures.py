@@ -156,6 +156,15 @@ def test_trough_is_drawn_with_its_gauss_curve_and_volume_loss():
     assert "volume loss 2 %" in axis.get_title() and axis.yaxis_inverted()
 
 
+def test_view_of_a_trough_to_one_side_ends_where_the_surface_does():
+    x = np.arange(-50.0, 51.0)
+    settlement = xr.DataArray([0.04 * np.exp(-((x - 20) ** 2) / (2 * 12.0**2))], {"time": [3.0], "x": x}, ("time", "x"))
+    settlement[0, :5] = np.nan  # no point there
+    found = postprocess.trough(settlement).assign(volume_loss=("time", [0.02]), width_over_depth=("time", [0.4]))
+    left, right = figures.settlement_trough(settlement, found).axes[0].get_xlim()
+    assert -49 < left <= -45 and 50 <= right < 53
+
+
 def test_forces_of_two_models_are_drawn_with_their_difference(run):
     response = datasets.read_response(run)
     other = response.assign(bending_moment=response["bending_moment"] + 2e3)

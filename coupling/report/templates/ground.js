@@ -1,12 +1,15 @@
-// The ground: points coloured by a field, the mesh, the linings, painted as one picture behind the axes of a chart.
+// The ground: a field between its points, the mesh, the linings, painted as one picture behind the axes of a chart.
 const REGIONS = [null, "#f2b8a8", "#d6e6f2"]; // of the mesh: ground, gate, inside of the tunnel
+// Of the picture, one value of the field; in sides of a point's square: how far it counts, how far its ground
+// reaches where all around is ground, and in a tunnel.
+const PIXELS = 2, FAR = 2, EDGE = [1.6, 0.9];
 
 class Ground extends Chart {
   constructor() {
     super({ name: "ground", title: "ground", unit: "" }, "canvas");
     const { fields, mesh, section: { gate, tunnels } } = data;
     Object.assign(this, { fields, mesh, gate, tunnels, home: tunnels[gate ? gate.tunnel : 0] });
-    this.picture = document.createElement("canvas");
+    [this.picture, this.small] = [0, 1].map(() => document.createElement("canvas"));
     const there = { tunnel: this.home || fields, gate, box: mesh };
     for (const name of Object.keys(there)) if (!there[name]) $("view").querySelector(`[value=${name}]`).remove();
     if (!fields) $("edges").checked = true;
@@ -71,19 +74,51 @@ class Ground extends Chart {
     if (this.mesh && $("edges").checked) this.paintMesh();
     return { type: "image", style: { image: this.picture, ...frame } };
   }
+  // a pixel that the ground of a point covers is the mean of the points around it, near and small ones counting most;
+  // none of them lies behind a lining
   paintPoints(metre) {
-    const snapshot = this.fields.snapshots[this.k], values = snapshot[$("field").value], stops = this.scale.colours;
-    const grow = 1.7 * snapshot.spread * this.fields.largest_side / 255 * metre, last = stops.length - 1;
-    const palette = Array.from({ length: 256 }, (_, v) => {
-      const low = Math.min(Math.floor(v / 255 * last), last - 1), share = v / 255 * last - low;
-      return `rgb(${stops[low].map((c, j) => Math.round(c + share * (stops[low + 1][j] - c)))})`;
-    });
+    const snapshot = this.fields.snapshots[this.k], values = snapshot[$("field").value], { picture } = this;
+    const wide = Math.ceil(picture.width / PIXELS), high = Math.ceil(picture.height / PIXELS), count = wide * high;
+    const sum = new Float32Array(count), weight = new Float32Array(count), nearest = new Float32Array(count).fill(Infinity);
+    const rooms = this.rooms(wide, high), grow = snapshot.spread * this.fields.largest_side / 255 * metre / PIXELS;
     for (let j = 0; j < snapshot.drawn; j++) {
-      const [a, b] = this.at(this.placeOf(snapshot, j)), side = Math.max(snapshot.side[j] * grow, 2);
-      if (!this.seen([a, b])) continue;
-      this.pen.fillStyle = palette[values[j]];
-      this.pen.fillRect(a - side / 2, b - side / 2, side, side);
+      const place = this.placeOf(snapshot, j), room = this.roomOf(...place), [a, b] = this.at(place).map((v) => v / PIXELS - 0.5);
+      const side = Math.max(snapshot.side[j] * grow, 0.6), far = FAR * side;
+      for (let q = Math.max(0, Math.ceil(b - far)); q <= Math.min(high - 1, b + far); q++) {
+        for (let p = Math.max(0, Math.ceil(a - far)); p <= Math.min(wide - 1, a + far); p++) {
+          const pixel = q * wide + p, square = ((p - a) ** 2 + (q - b) ** 2) / side ** 2;
+          if (square >= FAR ** 2 || rooms[pixel] !== room) continue;
+          const counts = (1 - square / FAR ** 2) ** 3 / side ** 2;
+          sum[pixel] += counts * values[j];
+          weight[pixel] += counts;
+          nearest[pixel] = Math.min(nearest[pixel], square);
+        }
+      }
     }
+    const stops = this.scale.colours, last = stops.length - 1, image = new ImageData(wide, high);
+    for (let pixel = 0; pixel < count; pixel++) {
+      if (!weight[pixel]) continue;
+      const v = sum[pixel] / weight[pixel] / 255 * last, low = Math.min(Math.floor(v), last - 1);
+      for (let c = 0; c < 3; c++) image.data[4 * pixel + c] = stops[low][c] + (v - low) * (stops[low + 1][c] - stops[low][c]);
+      image.data[4 * pixel + 3] = 255 * Math.max(0, Math.min(1, (EDGE[rooms[pixel] ? 1 : 0] - Math.sqrt(nearest[pixel])) * 5));
+    }
+    Object.assign(this.small, { width: wide, height: high }).getContext("2d").putImageData(image, 0, 0);
+    this.pen.drawImage(this.small, 0, 0, wide * PIXELS, high * PIXELS);
+  }
+  // 0 in the ground, k in tunnel k, counted from 1
+  roomOf(x, y) {
+    return this.tunnels.findIndex((one) => Math.hypot(x - one.x, y - one.y) < (one.outer + one.inner) / 2) + 1;
+  }
+  rooms(wide, high) {
+    const found = new Uint8Array(wide * high);
+    this.tunnels.forEach((one, k) => {
+      const [a, b] = this.at([one.x, one.y]), [right] = this.at([one.x + (one.outer + one.inner) / 2, one.y]);
+      for (let pixel = 0; pixel < found.length; pixel++) {
+        const p = (pixel % wide + 0.5) * PIXELS - a, q = (Math.floor(pixel / wide) + 0.5) * PIXELS - b;
+        if (Math.hypot(p, q) < right - a) found[pixel] = k + 1;
+      }
+    });
+    return found;
   }
   paintLining(tunnel, gate) {
     // the walls of the gate are parallel: its angle differs on the two faces
