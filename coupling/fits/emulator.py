@@ -22,7 +22,7 @@ SMALLEST_SPREAD = 1e-6
 #: Components are taken until they hold this share of the outputs' variance, or are so many.
 SHARE_KEPT, MOST_COMPONENTS = 0.9995, 12
 #: Parts of the runs that are left out in turn.
-FOLDS = 8
+FOLDS = 4
 #: Fewest and most degrees of freedom of errors: below, they would have no variance; above, they are normal.
 FREEDOM = (2.5, 200.0)
 
@@ -39,7 +39,7 @@ def require_scikit_learn() -> None:
 
 
 class Validation(NamedTuple):
-    """Cross-validation: of each output over all runs, each left out with an eighth of them, (m,) float64.
+    """Cross-validation: of each output over all runs, each left out with a quarter of them, (m,) float64.
 
     error : root of the mean squared error, in the output's unit;  explained : share of the variance, 1 - sum of squared
     errors over that around the mean [-];  standardised : root of the mean squared error over the variance that the
@@ -77,7 +77,7 @@ class Emulator:
     (Matern 5/2, a correlation length a parameter, noise); what components leave is noise of each output. Errors of
     components are correlated as leave-one-out finds them, shrunk towards no correlation since runs are few. How large
     they are together, and how often some run is far off in all of them, is found by runs that neither processes, their
-    lengths and noise, nor the correlation have seen: an eighth of all runs at a time.
+    lengths and noise, nor the correlation have seen: a quarter of all runs at a time.
 
     Parameters
     ----------

@@ -15,10 +15,13 @@ import shutil
 import subprocess
 import tomllib
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import ClassVar
 
+import h5py
 import matplotlib
+import numpy as np
 import pytest
 import typer
 from markdown_it import MarkdownIt
@@ -125,8 +128,8 @@ def read_toml(block):
         structure.Limits.model_validate(data)
 
 
-def follow(page):
-    """Do in the current folder what a page says."""
+def follow(page, whole=False, more=()):
+    """Do in the current folder what a page says; `whole`: also what is not run otherwise; `more`: words of commands."""
     names = {"__name__": "__main__"}
     for block in blocks(page):
         if block.language in SHOWN:
@@ -135,8 +138,8 @@ def follow(page):
             continue
         if block.language == "bash":
             for words in command_lines(block.text):
-                if block.is_run:
-                    execute(words, block.place)
+                if block.is_run or whole:
+                    execute([*words, *more], block.place)
                 elif is_gush(words):
                     parse(words, block.place)
         elif block.language == "toml":
@@ -144,7 +147,7 @@ def follow(page):
         elif block.language == "python":
             # line numbers of the page, so that a traceback points into it
             code = compile("\n" * (block.line - 1) + block.text, str(ROOT / page), "exec")
-            if block.is_run:
+            if block.is_run or whole:
                 exec(code, names)
         else:
             pytest.fail(f"{block.place}: a block must name its language, one of bash, toml, python, text")
@@ -207,6 +210,35 @@ def test_page_works(page, followed, tmp_path, monkeypatch):
     monkeypatch.setattr(structure.models, "_REGISTERED", {})
     with matplotlib.rc_context():
         follow(page)
+
+
+def test_page_of_the_fit_goes_from_a_table_to_a_band_of_utilisation_in_an_empty_folder(tmp_path, monkeypatch, capsys):
+    """All of it as it stands, in this process; sixteen runs are copies of one, scaled by their parameters."""
+    page, real, begun = "docs/how-to/fit.md", import_module("coupling.runs.run").run, []
+
+    def stand_in(scene, folder, **_):
+        begun.append(folder)
+        (ground,) = scene.soils
+        if not (tmp_path / "one").exists():
+            real(scene.model_copy(update={"stop": scene.stop.model_copy(update={"time": 0.16})}), tmp_path / "one")
+        shutil.copytree(tmp_path / "one", folder, dirs_exist_ok=True)
+        rest = ground.k0 / 0.55
+        with h5py.File(folder / "run.nc", "r+") as file:
+            turned = np.cos(np.radians(file["lining/theta"][:] - scene.gate.angle))
+            file["lining/soil_pressure"][:] *= rest * (1 + 0.1 * turned)
+            for group in ("history", "lining"):
+                file[f"{group}/inflow_mass"][:] *= (ground.hydraulic_conductivity / 1e-4) ** 0.5
+            for name in ("stress_xx", "displacement_y"):
+                file[f"points/{name}"][:] *= rest
+
+    monkeypatch.setattr(import_module("coupling.runs.run"), "run", stand_in)
+    monkeypatch.chdir(tmp_path)
+    with matplotlib.rc_context():
+        follow(page, whole=True, more=("--workers", "0"))
+    assert len(begun) == 16
+    assert {path.name for path in (tmp_path / "fits/leak").iterdir()} == {"ensemble", "fit.nc", "fit.png"}
+    printed = capsys.readouterr().out
+    assert "bending_moment_utilisation" in printed and "of the posterior passes the limit" in printed
 
 
 def test_docstring_examples_hold():

@@ -1,6 +1,6 @@
-"""Numbers of docs/fit-coverage.md: how often the bands of a fit hold the truth, by 20 true runs and noise upon them.
+"""Numbers of docs/fit-coverage.md: how often the bands of a fit hold the truth, runs left out in turn being the truths.
 
-uv run python -m verification.reports.fit [FOLDER]    # runs of some seconds each; half an hour on two cores at most
+uv run python -m verification.reports.fit [FOLDER]    # 128 runs of some seconds each, kept in FOLDER; then some minutes
 """
 
 import sys
@@ -8,22 +8,30 @@ import time as clock
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import binom, qmc
 
+from coupling.fits.emulator import Emulator, Spread
 from coupling.fits.ensemble import read_ensemble
-from coupling.fits.fit import LEVELS, infer, observe
-from coupling.fits.prediction import curve_emulators, predicted, shown
-from coupling.fits.prior import places_of, read_plan, values_of
-from coupling.measurements.measurement import Measurement
+from coupling.fits.fit import LEVELS, observe
+from coupling.fits.posterior import Likelihood
+from coupling.fits.prediction import shown
+from coupling.fits.prior import places_of, read_plan
+from coupling.measurements.measurement import Measurement, error_covariance
 from coupling.studies.execute import study
 from verification.pages import DOCS, docs_page, made_by, table, write_data
 from verification.small_event import small_scene
 
-TRIALS = 20
+#: Runs that an emulator is made of; parts of all runs that are truths in turn.
+SIZES, PARTS = (32, 64, 96), 4
+#: Runs of the fit that is repeated with normal errors of the emulator.
+NORMAL = 64
+#: Places over the prior whose weights make a posterior.
+PLACES = 8192
 #: Of each value, one standard deviation.
 NOISE = 0.05
 END = 0.3  # [s]
 PLAN = {
-    "samples": 64,
+    "samples": 128,
     "records": 13,
     "parameters": {
         "gate.angle": {"low": 60.0, "high": 120.0},
@@ -55,104 +63,158 @@ def measurements(values, errors):
     )  # fmt: skip
 
 
-def run_all(folder):
-    """The ensemble's runs and the true ones, all as studies of one scene; truths are drawn from the priors."""
+def run_all(folder, plan):
+    """The runs, as a study of one scene; returns their CPU time [s]."""
     folder.mkdir(parents=True, exist_ok=True)
     scene = folder / "scene.toml"
-    scene.write_text(small_scene(stop={"inflow_mass": 1e5, "time": END}).source, encoding="utf-8")
-    plan = read_plan(PLAN)
-    truths = values_of(plan, np.random.default_rng(1).random((TRIALS, len(plan.parameters))))
-    columns = dict(zip(plan.parameters, truths.T.tolist(), strict=True))
-    hidden = {"name": "truth", "scene": str(scene), "design": "list", "parameters": columns, "records": plan.records}
-    seconds = {}
-    for name, what in (("ensemble", plan.study(scene)), ("truth", hidden)):
-        dataset = study(what, folder / name, progress=print)
-        seconds[name] = float(dataset["cpu_seconds"].sum())
-    return plan, truths, seconds
+    if not scene.exists():
+        scene.write_text(small_scene(stop={"inflow_mass": 1e5, "time": END}).source, encoding="utf-8")
+    dataset = study(plan.study(scene), folder / "ensemble", progress=print)
+    return float(dataset["cpu_seconds"].sum())
 
 
-def trial(plan, observed, emulators, truth, measured, curves, time, seed):
-    """One hidden truth: measured with noise, fitted, and which bands hold it."""
-    errors = NOISE * np.abs(measured)
-    noisy = measured + errors * np.random.default_rng([7, seed]).normal(size=len(measured))
-    found, likelihood = infer(plan, measurements(noisy.tolist(), errors.tolist()), observed)
-    draws, where = values_of(plan, found.shares), places_of(plan, found.shares)
-    low, high = np.quantile(draws, [LEVELS[0], LEVELS[-1]], axis=0)
-    own = np.column_stack([p.place(v) for p, v in zip(plan.parameters.values(), truth[:, None], strict=True)])
-    # the most probable region that holds 90 %: its density is above the tenth part of the draws'
-    region = likelihood.logarithm(own)[0] >= np.quantile(likelihood.logarithm(where), 0.1)
-    bands = predicted(plan, time, emulators, {"posterior": where}, LEVELS).isel(knowledge=0, time=-1)
-    ends = {name: bands[name].values[[0, -1]] for name in PREDICTED}
-    return {
-        "truth": truth.tolist(),
-        "low": low.tolist(),
-        "high": high.tolist(),
-        "share_below": (draws < truth).mean(axis=0).tolist(),
-        "inside": ((low <= truth) & (truth <= high)).tolist(),
-        "region": bool(region),
-        "predicted": {name: bool(a <= curves[name][-1] <= b) for name, (a, b) in ends.items()},
-        "accepted": found.accepted,
-        "different": found.different,
-    }
+def some_of(ensemble, rows):
+    """An ensemble of some of the runs."""
+    curves = {name: values[rows] for name, values in ensemble.curves.items()}
+    return ensemble._replace(places=ensemble.places[rows], measured=ensemble.measured[rows], curves=curves)
 
 
-def coverage_rows(plan, trials):
-    """How many trials hold the truth: of each parameter, of all of them, of what is predicted; and widths of bands."""
+class Fitted:
+    """What a fit makes of some runs, at places that are the same for all truths."""
+
+    def __init__(self, plan, ensemble):
+        self.observed = observe(ensemble)
+        shares = qmc.Sobol(len(plan.parameters), rng=np.random.default_rng(5)).random(PLACES)
+        self.places = places_of(plan, shares)
+        self.components = self.observed.emulator.components(self.places)
+        rng = np.random.default_rng(plan.seed)
+        last = {name: ensemble.curves[name][:, -1:] for name in PREDICTED}
+        self.ends = {name: Emulator(ensemble.places, values, values.std(axis=0)).draws(self.places, rng)[:, 0]
+                     for name, values in last.items()}  # fmt: skip
+
+    def trial(self, truth, measured, ends, seed):
+        """One hidden truth, measured with noise: of each parameter and prediction the share of the posterior below it.
+
+        Returns a dict: below (d,), widths (d,) of the bands over those of the prior, region: whether the most probable
+        region holds the truth, predicted: name to share, effective: number of effective places.
+        """
+        errors = NOISE * np.abs(measured)
+        noisy = measured + errors * np.random.default_rng([7, seed]).normal(size=len(measured))
+        given, emulator = measurements(noisy.tolist(), errors.tolist()), self.observed.emulator
+        likelihood = Likelihood(emulator, noisy, error_covariance(given))
+        logarithm = likelihood.logarithm_of(self.components)
+        weights = np.exp(logarithm - logarithm.max())
+        weights /= weights.sum()
+        widths = [np.ptp(_quantiles(column, weights, LEVELS)) / np.ptp(LEVELS) for column in self.places.T]
+        # the most probable region that holds 90 %: its density is above the tenth part of the posterior's
+        least = _quantiles(logarithm, weights, [1 - np.ptp(LEVELS)])[0]
+        return {
+            "below": [float(weights @ (column < own)) for column, own in zip(self.places.T, truth, strict=True)],
+            "widths": [float(width) for width in widths],
+            "region": bool(likelihood.logarithm(truth[None])[0] >= least),
+            "predicted": {name: float(weights @ (drawn < ends[name])) for name, drawn in self.ends.items()},
+            "effective": float(1 / np.sum(weights**2)),
+        }
+
+
+def _quantiles(values, weights, shares):
+    order = np.argsort(values)
+    return np.interp(shares, np.cumsum(weights[order]), values[order])
+
+
+def trials_of(plan, ensemble, size, kinds):
+    """Every run once as the truth, of a fit of `size` of the runs of the other parts.
+
+    kinds : of the emulator's errors: "as found", or "normal" and as large as leave-one-out says, instead of its
+    `spread`. Returns a list of dict, one for each.
+    """
+    rng = np.random.default_rng(3)
+    order, spreads, trials = rng.permutation(len(ensemble.places)), [], {kind: [] for kind in kinds}
+    for part in range(PARTS):
+        truths = order[part::PARTS]
+        others = rng.permutation(np.setdiff1d(order, truths))[:size]
+        fitted = Fitted(plan, some_of(ensemble, others))
+        emulator = fitted.observed.emulator
+        spreads.append(emulator.spread._asdict())
+        for kind in kinds:
+            if kind == "normal":
+                emulator.spread = Spread(1.0, 1e9)
+            for k in truths:
+                ends = {name: ensemble.curves[name][k, -1] for name in PREDICTED}
+                trials[kind].append(fitted.trial(ensemble.places[k], ensemble.measured[k], ends, int(k)))
+        print(f"{size} runs, part {part + 1} of {PARTS}: {spreads[-1]}", flush=True)
+    return [{"size": size, "errors": kind, "spreads": spreads, "trials": trials[kind]} for kind in kinds]
+
+
+def held(shares):
+    """Whether 90 % bands hold a truth, by the share of the posterior below it."""
+    return (np.asarray(shares) > LEVELS[0]) & (np.asarray(shares) < LEVELS[-1])
+
+
+def coverage_rows(plan, found):
+    """How many trials hold the truth: of each parameter, with the band's mean width, of all, of what is predicted."""
+
+    def told(count, one):
+        return f"{count} of {len(one['trials'])} ({count / len(one['trials']):.0%})"
+
     rows = []
-    for k, (name, prior) in enumerate(plan.parameters.items()):
-        widths = [prior.place(one["high"][k]) - prior.place(one["low"][k]) for one in trials]
-        held = sum(one["inside"][k] for one in trials)
-        rows.append((name, f"{held} of {TRIALS}", f"{np.mean(widths) / 0.9:.0%}"))
-    rows.append(("most probable region of all", f"{sum(one['region'] for one in trials)} of {TRIALS}", ""))
-    rows += [(f"predicted {shown(name)[0]}", f"{sum(one['predicted'][name] for one in trials)} of {TRIALS}", "")
-             for name in PREDICTED]  # fmt: skip
+    for k, name in enumerate(plan.parameters):
+        columns = [[held(trial["below"][k]) for trial in one["trials"]] for one in found]
+        widths = [np.mean([trial["widths"][k] for trial in one["trials"]]) for one in found]
+        rows.append((name, *(f"{told(sum(column), one)}, {width:.0%} wide"
+                             for column, width, one in zip(columns, widths, found, strict=True))))  # fmt: skip
+    rows.append(("most probable region of all", *(told(sum(t["region"] for t in one["trials"]), one) for one in found)))
+    for name in PREDICTED:
+        counts = [sum(held(trial["predicted"][name]) for trial in one["trials"]) for one in found]
+        label = f"predicted {shown(name)[0]}"
+        rows.append((label, *(told(count, one) for count, one in zip(counts, found, strict=True))))
     return rows
 
 
-def trial_rows(trials):
-    """Truth and band of every trial."""
+def spread_rows(found):
+    """Of the fits of every size: how errors of runs that were not seen are distributed."""
     rows = []
-    for number, one in enumerate(trials, start=1):
-        columns = zip(*(one[key] for key in ("low", "truth", "high", "inside")), strict=True)
-        cells = (
-            f"{truth:.3g} in {low:.3g} .. {high:.3g}" if inside else f"**{truth:.3g}** not in {low:.3g} .. {high:.3g}"
-            for low, truth, high, inside in columns
-        )
-        rows.append((number, *cells))
+    for one in found:
+        cells = [", ".join(f"{spread[key]:.2f}" for spread in one["spreads"]) for key in ("factor", "freedom")]
+        effective = [trial["effective"] for trial in one["trials"]]
+        rows.append((one["size"], *cells, f"{np.median(effective):.0f}, {min(effective):.0f} at least"))
     return rows
 
 
 def main(folder="fit-coverage"):
     """Run, fit and write the page."""
     begin = clock.perf_counter()
-    page = docs_page("fit-coverage", "made", "coverage", "trials", "emulators")
-    plan, truths, seconds = run_all(Path(folder))
+    page = docs_page("fit-coverage", "made", "coverage", "spreads", "emulators")
+    plan = read_plan(PLAN)
+    seconds = run_all(Path(folder), plan)
     given = measurements(*([1.0] * sum(len(row[-1]) for row in MEASURED),) * 2)
-    ensemble, true = (read_ensemble(plan, given, Path(folder) / name) for name in ("ensemble", "truth"))
-    observed, emulators = observe(ensemble), curve_emulators(ensemble)
-    trials = []
-    for k in range(TRIALS):
-        curves = {name: np.interp(ensemble.time, true.time, values[k]) for name, values in true.curves.items()}
-        trials.append(trial(plan, observed, emulators, truths[k], true.measured[k], curves, ensemble.time, k))
-    wall = clock.perf_counter() - begin
+    ensemble = read_ensemble(plan, given, Path(folder) / "ensemble")
+    found = {size: trials_of(plan, ensemble, size, ("as found", "normal")[: 1 + (size == NORMAL)]) for size in SIZES}
+    found, normal = [one[0] for one in found.values()], found[NORMAL][1]
+    emulator = observe(ensemble).emulator
+    wall, runs = clock.perf_counter() - begin, len(ensemble.places)
     made = made_by("python -m verification.reports.fit")
-    cost = (f"{len(ensemble.places)} runs and {TRIALS} true ones of {seconds['ensemble'] / len(ensemble.places):.1f} "
-            f"CPU seconds each, {ensemble.failed} failed; {wall / 60:.1f} minutes for all of it.")  # fmt: skip
-    rows = coverage_rows(plan, trials)
+    least, most = binom.interval(0.9, runs, np.ptp(LEVELS))
+    cost = (f"{runs} runs of {seconds / runs:.1f} CPU seconds each, {ensemble.failed} failed; {wall / 60:.1f} minutes "
+            f"for all that was not there yet. Of {runs} bands of 90 % that know themselves {least:.0f} to {most:.0f} "
+            "hold the truth, nine times in ten.")  # fmt: skip
     checks = [
         (one.quantity, one.place_text, f"{one.time:g} s", f"{error:.3g} {one.unit}", f"{explained:.1%}", f"{own:.2f}")
-        for one, error, explained, own in zip(given, *observed.emulator.validation, strict=True)
+        for one, error, explained, own in zip(given, *emulator.validation, strict=True)
     ]
-    heads = ("measured", "where", "when", "error left out", "variance explained", "error over its own")
+    sizes = [f"{size} runs" for size in SIZES]
+    rows = coverage_rows(plan, [*found, normal])
     page.fill({
         "made": f"{made} {cost}",
-        "coverage": table(("90 % band of", "holds the truth", "mean width of the band over the prior's"), rows),
-        "trials": table(("trial", *plan.parameters), trial_rows(trials)),
-        "emulators": table(heads, checks),
+        "coverage": table(("90 % band of", *sizes, f"{NORMAL} runs, normal errors"), rows),
+        "spreads": table(("runs", "factor of the variance", "degrees of freedom", "effective places"),
+                         spread_rows(found)),
+        "emulators": table(("measured", "where", "when", "error left out", "variance explained", "error over its own"),
+                           checks),
     })  # fmt: skip
-    data = {"made": made, "wall_seconds": wall, "cpu_seconds": seconds, "trials": trials}
+    data = {"made": made, "wall_seconds": wall, "cpu_seconds": seconds, "fits": [*found, normal]}
     write_data(DOCS / "fit-coverage.json", data)
-    print("\n".join(table(("band of", "holds", "width"), rows)), cost, sep="\n")
+    print("\n".join(table(("band of", *sizes, "normal"), rows)), cost, sep="\n")
 
 
 if __name__ == "__main__":
