@@ -18,7 +18,7 @@ from coupling.fits.prediction import shown
 from coupling.fits.prior import places_of, read_plan
 from coupling.measurements.measurement import Measurement, error_covariance
 from coupling.studies.execute import study
-from verification.pages import DOCS, docs_page, made_by, table, write_data
+from verification.pages import docs_page, made_by, table
 from verification.small_event import small_scene
 
 #: Runs that an emulator is made of; parts of all runs that are truths in turn.
@@ -212,8 +212,6 @@ def main(folder="fit-coverage"):
         "emulators": table(("measured", "where", "when", "error left out", "variance explained", "error over its own"),
                            checks),
     })  # fmt: skip
-    data = {"made": made, "wall_seconds": wall, "cpu_seconds": seconds, "fits": [*found, normal]}
-    write_data(DOCS / "fit-coverage.json", data)
     print("\n".join(table(("band of", *sizes, "normal"), rows)), cost, sep="\n")
 
 
