@@ -73,7 +73,7 @@ class ReducedRing:
         self.mass[:3, :3] = rigid.T @ (mass @ rigid)
         np.fill_diagonal(self.mass[3:, 3:], mass_of_ring)
         self.weight = -gravity * (self.basis.T @ (mass @ rigid[:, 1]))
-        held = parts.linear if self.law.linear else parts.body
+        held = parts.linear if self.joints_linear else parts.body
         self.stiffness = np.zeros_like(self.mass)
         self.stiffness[3:, 3:] = deformed.T @ (held @ deformed)
         jumps = parts.jumps @ self.basis

@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 
 import coupling
+from structure import Bolts
 from structure.lining import THETA
 from structure.models import lining_model
 from structure.reduced import ReducedRing
@@ -13,6 +14,7 @@ A = np.radians(THETA)
 DENSITY, GRAVITY = 2500.0, 9.81
 OVALISING = 4e5 + 5e4 * np.cos(2 * A)
 BLOCKS = OVALISING - 1e5 * (np.abs(np.sin(A)) > np.cos(np.radians(15.5)))  # soil gone over 30 degrees at both waists
+BOLTED = {"joint_bolts": Bolts(offset=-0.05, length=0.4, stiffness=2e8, preload=1e6)}
 WEAK = {"joint_contact_only": True, "joint_contact_height": 0.3, "joint_friction_coefficient": 0.6}
 
 
@@ -59,6 +61,8 @@ def answer(lining, pressure):
         pytest.param("beam-spring", {}, BLOCKS, 6e-3, id="beams-blocks"),
         pytest.param("beam-spring", WEAK, OVALISING, 1e-3, id="gaping-and-sliding-joints"),
         pytest.param("continuum", {}, BLOCKS, 6e-3, id="continuum-blocks"),
+        pytest.param("beam-spring", BOLTED, OVALISING, 1e-3, id="bolts-of-beams"),
+        pytest.param("continuum", BOLTED, OVALISING, 2e-3, id="bolts-between-anchors"),
     ],
 )
 def test_ring_at_rest_is_that_of_the_lining_model(ring, model, laws, pressure, most):
