@@ -156,6 +156,7 @@ def follow(page, whole=False, more=()):
 class Remembered(mpm.Simulation):
     """Gives the records of a scene once more that was simulated to its end before: pages run the same scenes."""
 
+    __module__ = mpm.Simulation.__module__  # stands for it, also in the reference
     known: ClassVar[dict] = {}
     made = again = None
 
