@@ -42,8 +42,8 @@ class Validation(NamedTuple):
     """Cross-validation: of each output over all runs, each left out with a quarter of them, (m,) float64.
 
     error : root of the mean squared error, in the output's unit;  explained : share of the variance, 1 - sum of squared
-    errors over that around the mean [-];  standardised : root of the mean squared error over the variance that the
-    emulator gives [-], 1 where it knows its error.
+    errors over that around the mean, 1 where nothing varies [-];  standardised : root of the mean squared error over
+    the variance that the emulator gives [-], 1 where it knows its error.
     """
 
     error: Array
@@ -115,10 +115,12 @@ class Emulator:
         missed = errors @ self.basis + self.left
         parts = deviation[:, :, None] * self.basis
         known = self.spread.variance * np.sum(parts * (self.correlation @ parts), axis=1) + self.variance_left
-        spread = np.maximum(np.sum(scaled**2, axis=0), 1e-300)
+        spread = np.sum(scaled**2, axis=0)
+        varies = spread > SMALLEST_SPREAD**2 * len(scaled)
+        unexplained = np.sum(missed**2, axis=0) / np.where(varies, spread, 1.0)
         return Validation(
             error=np.sqrt(np.mean(missed**2, axis=0)) * self.scale,
-            explained=1 - np.sum(missed**2, axis=0) / spread,
+            explained=np.where(varies, 1 - unexplained, 1.0),
             standardised=np.sqrt(np.mean(missed**2 / np.maximum(known, 1e-300), axis=0)),
         )
 

@@ -212,3 +212,11 @@ def test_runs_that_end_too_early_are_refused(plan):
     early = ensemble._replace(measured=np.where(np.arange(32)[:, None] > 8, np.nan, ensemble.measured))
     with pytest.raises(Refused, match=r"at least 12 runs must get to all measurements, got 0 of 32"):
         observe(early)
+
+
+def test_output_that_never_varies_has_nothing_to_explain():
+    rng = np.random.default_rng(0)
+    places = rng.random((16, 2))
+    outputs = np.column_stack([np.full(16, 3.0) + 1e-12 * rng.normal(size=16), places @ [1.0, 2.0]])
+    explained = Emulator(places, outputs, np.ones(2)).validation.explained
+    assert explained[0] == 1.0 and 0.9 < explained[1] <= 1.0
