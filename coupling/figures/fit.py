@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
+from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
 from coupling.figures.picture import GATE, INITIAL, NOW, STYLE, Picture
 
@@ -60,6 +61,9 @@ def _parameter(axis, fit, name):
     axis.axvspan(prior[0], prior[-1], ymax=0.03, color=INITIAL)
     if logarithmic:
         axis.set_xscale("log")
+        axis.xaxis.set_major_locator(LogLocator(subs=(1, 3)))
+        axis.xaxis.set_major_formatter(LogFormatterSciNotation(labelOnlyBase=False, minor_thresholds=(np.inf, np.inf)))
+        axis.xaxis.set_minor_formatter(NullFormatter())
     unit = str(one["unit_of_parameter"].values)
     axis.set_xlabel(name if unit == "1" else f"{name} [{unit}]")
     axis.set_yticks([])
