@@ -19,12 +19,12 @@ from structure.plausibility import Usual, unusual
 Mistake = tuple[tuple[Any, ...], str]
 
 _Entry = TypeVar("_Entry")
-#: Ways to read an entry, which pydantic puts into the location of a mistake.
-_WAYS = ("one", "several")
+#: Ways to read an entry, which pydantic puts into the location of a mistake; no key is called so.
+_WAYS = ("<one>", "<several>")
 #: One entry, or a tuple of them.
 OneOrSeveral = Annotated[
-    Annotated[_Entry, Tag("one")] | Annotated[tuple[_Entry, ...], Tag("several")],
-    Discriminator(lambda value: "several" if isinstance(value, list | tuple) else "one"),
+    Annotated[_Entry, Tag(_WAYS[0])] | Annotated[tuple[_Entry, ...], Tag(_WAYS[1])],
+    Discriminator(lambda value: _WAYS[isinstance(value, list | tuple)]),
 ]
 
 _LIMITS = {"gt": "above", "ge": "from", "lt": "below", "le": "up to"}

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from structure.arcs import periodic_shares
 from structure.ring import Ring
 
 if TYPE_CHECKING:
@@ -30,11 +31,13 @@ def resultants(pressures: xr.Dataset, outer_radius: float) -> dict[str, np.ndarr
     diameter [Pa].
     """
     theta = np.radians(np.arange(0.25, 360, 0.5))
-    at = pressures["theta"].values.astype(float)
+    at = np.radians(pressures["theta"].values.astype(float))
+    order = np.argsort(at % (2 * np.pi))
+    (first, second), (near, far) = periodic_shares(at[order] % (2 * np.pi), theta)
 
     def around(name):
-        rows = pressures[name].transpose("time", "theta").values
-        return np.stack([np.interp(np.degrees(theta), at, row, period=360) for row in rows])
+        values = pressures[name].transpose("time", "theta").values[:, order]
+        return near * values[:, first] + far * values[:, second]
 
     arc, lower = outer_radius * np.radians(0.5), np.cos(theta) < 0
     upward = -np.cos(theta) * around("soil_pressure") - np.sin(theta) * around("soil_shear")

@@ -33,12 +33,9 @@ UNITS = {
         "neighbour.radial_stiffness neighbour.tangential_stiffness",
         ("ring", "N/m"): "joint_bolts.preload",
         ("limits", "N/m**3"): "stability.buoyant_unit_weight",
-        (
-            "limits",
-            "m",
-        ): "stability.cover gasket_opening gasket_offset joint_dislocation joint_contact_height crack_width "
-        "capacity.minimum_eccentricity segment.cover_outer segment.cover_inner segment.bar_diameter_outer "
-        "segment.bar_diameter_inner segment.bar_spacing_outer segment.bar_spacing_inner",
+        ("limits", "m"): "gasket_opening gasket_offset joint_dislocation joint_contact_height crack_width "
+        "stability.cover capacity.minimum_eccentricity segment.cover_outer segment.cover_inner "
+        "segment.bar_diameter_outer segment.bar_diameter_inner segment.bar_spacing_outer segment.bar_spacing_inner",
     }.items()
     for name in names.split()
 } | {f"limits.own.{name}": RESPONSE[name][1].replace(" ", "*") for name in OWN}

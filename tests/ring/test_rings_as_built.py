@@ -173,3 +173,9 @@ def test_mistakes_in_a_ring_as_built_are_told(tmp_path, old, new, message):
     path.write_text(SCENE.replace(old, new))
     with pytest.raises(coupling.SceneError, match=message):
         coupling.load_scene(path)
+
+
+@pytest.mark.parametrize("key", ["one", "several"])
+def test_unknown_key_is_told_whatever_its_name(key):
+    with pytest.raises(InputError, match=f"{key}: unknown key, got 1"):
+        ring(**{key: 1})
