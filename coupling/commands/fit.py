@@ -95,7 +95,7 @@ def _tables(data):
         told = (f"{time:.3g} s" if time != float("inf") else "later or never" for time in times)
         limits.add_row(one["label"], f"{one['share_passing']:.0%}", *told)
     heads = ("emulator", "error", "variance explained", "error over its own")
-    emulators = Table(*heads, title="cross-validation: a quarter of the runs left out in turn")
+    emulators = Table(*heads, title="cross-validation: each run left out in turn")
     for name, one in data["emulators"].items():
         error = f"{one['scale'] * one['error']:.3g} {one['unit']}"
         emulators.add_row(name.replace("_", " "), error, f"{one['explained']:.1%}", f"{one['standardised']:.2f}")

@@ -7,9 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 from scipy.linalg import cho_solve
-from scipy.optimize import minimize
 
 from coupling.refused import Refused
 
@@ -21,10 +19,6 @@ MOST_ALONE = 24
 SMALLEST_SPREAD = 1e-6
 #: Components are taken until they hold this share of the outputs' variance, or are so many.
 SHARE_KEPT, MOST_COMPONENTS = 0.9995, 12
-#: Parts of the runs that are left out in turn.
-FOLDS = 4
-#: Fewest and most degrees of freedom of errors: below, they would have no variance; above, they are normal.
-FREEDOM = (2.5, 200.0)
 
 
 def require_scikit_learn() -> None:
@@ -39,7 +33,7 @@ def require_scikit_learn() -> None:
 
 
 class Validation(NamedTuple):
-    """Cross-validation: of each output over all runs, each left out with a quarter of them, (m,) float64.
+    """Leave-one-out cross-validation, of each output over all runs, (m,) float64.
 
     error : root of the mean squared error, in the output's unit;  explained : share of the variance, 1 - sum of squared
     errors over that around the mean, 1 where nothing varies [-];  standardised : root of the mean squared error over
@@ -51,33 +45,13 @@ class Validation(NamedTuple):
     standardised: Array
 
 
-class Spread(NamedTuple):
-    """How errors of runs that were not seen are distributed: Student's t in all components at once.
-
-    factor : of the variances that the processes give [-];  freedom : degrees of freedom [-].
-    """
-
-    factor: float
-    freedom: float
-
-    @property
-    def variance(self) -> float:
-        """Variance over that which the processes give."""
-        return self.factor * self.freedom / (self.freedom - 2)
-
-    def factors(self, shares: Array) -> Array:
-        """Of the variance of one run, at shares (n,) of its distribution below it."""
-        return self.factor * self.freedom / stats.chi2.isf(shares, self.freedom)
-
-
 class Emulator:
     """Outputs of runs over the places of their parameters.
 
     Each output, less its mean and over `scale`, or each principal component where there are many, is a Gaussian process
     (Matern 5/2, a correlation length a parameter, noise); what components leave is noise of each output. Errors of
-    components are correlated as leave-one-out finds them, shrunk towards no correlation since runs are few. How large
-    they are together, and how often some run is far off in all of them, is found by runs that neither processes, their
-    lengths and noise, nor the correlation have seen: a quarter of all runs at a time.
+    components are normal, correlated as leave-one-out finds them, shrunk towards no correlation since runs are few, and
+    enlarged where it finds them too small.
 
     Parameters
     ----------
@@ -90,8 +64,8 @@ class Emulator:
     Attributes
     ----------
     mean, scale : (m,);  basis : (k, m), orthonormal components;  left : (n, m), what they leave of each run's outputs
-    over scale;  correlation : (k, k), of the errors of the components over their deviations;  spread : Spread;
-    validation : Validation, with the basis of all runs.
+    over scale;  correlation : (k, k), of the errors of the components over their deviations;  validation : Validation,
+    with the basis, noise and correlation lengths of all runs.
 
     Source: Higdon, Gattiker, Williams & Rightley (2008); leave-one-out: Dubrule (1983), Rasmussen & Williams (2006),
     eq. 5.12; shrinking: Ledoit & Wolf (2004).
@@ -104,17 +78,16 @@ class Emulator:
         components, count = scaled @ self.basis.T, len(self.basis)
         self.left = scaled - components @ self.basis
         self._sizes = np.sqrt(np.mean(components**2, axis=0))
-        unit = components / self._sizes
-        self._processes = [_process(places, values) for values in unit.T]
-        self.correlation = _correlation(self._processes, len(places))
-        errors, deviation, distances = _unseen(places, unit, self._processes)
-        self.spread = _spread(distances, count)
+        self._processes = [_process(places, values) for values in (components / self._sizes).T]
+        apart = np.array([_left_out(process) for process in self._processes]).reshape(count, 2, len(places))
+        errors, deviation = apart[:, 0].T, np.sqrt(apart[:, 1].T)
+        self.correlation = _correlation(errors / deviation)
         self.validation = self._validated(scaled, errors * self._sizes, deviation * self._sizes)
 
     def _validated(self, scaled, errors, deviation):
         missed = errors @ self.basis + self.left
         parts = deviation[:, :, None] * self.basis
-        known = self.spread.variance * np.sum(parts * (self.correlation @ parts), axis=1) + self.variance_left
+        known = np.sum(parts * (self.correlation @ parts), axis=1) + self.variance_left
         spread = np.sum(scaled**2, axis=0)
         varies = spread > SMALLEST_SPREAD**2 * len(scaled)
         unexplained = np.sum(missed**2, axis=0) / np.where(varies, spread, 1.0)
@@ -132,7 +105,7 @@ class Emulator:
     def components(self, places: Array) -> tuple[Array, Array]:
         """Means and standard deviations of the components of the outputs over scale at places (p, d), (p, k) each.
 
-        The covariance of their errors is that of `correlation` times the deviations, times a factor of `spread`.
+        The covariance of their errors is that of `correlation` times the deviations.
         """
         if not self._processes:
             return np.zeros((len(places), 0)), np.zeros((len(places), 0))
@@ -147,8 +120,7 @@ class Emulator:
     def draws(self, places: Array, rng: np.random.Generator) -> Array:
         """Outputs (p, m) at places (p, d), each with an error of the emulator."""
         mean, deviation = self.components(places)
-        normal = rng.normal(size=mean.shape) @ np.linalg.cholesky(self.correlation).T
-        drawn = mean + deviation * normal * np.sqrt(self.spread.factors(rng.random(len(mean))))[:, None]
+        drawn = mean + deviation * (rng.normal(size=mean.shape) @ np.linalg.cholesky(self.correlation).T)
         return self.outputs(drawn) + self.scale * self.left[rng.integers(len(self.left), size=len(places))]
 
 
@@ -161,75 +133,33 @@ def _basis(scaled):
     return right[: min(int(np.argmax(held >= SHARE_KEPT)) + 1, MOST_COMPONENTS)]
 
 
-def _process(places, values, start=None):
-    """The Gaussian process of one component of unit size; `start`: that of other runs, to begin with its kernel."""
+def _process(places, values):
+    """The Gaussian process of one component of unit size."""
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
     lengths = np.full(places.shape[1], 0.5)
     kernel = ConstantKernel(1.0, (1e-2, 1e3)) * Matern(lengths, (0.05, 50.0), nu=2.5) + WhiteKernel(1e-3, (1e-8, 1.0))
-    begin, restarts = (kernel, 1) if start is None else (start.kernel_, 0)
-    process = GaussianProcessRegressor(begin, n_restarts_optimizer=restarts, random_state=0)
+    process = GaussianProcessRegressor(kernel, n_restarts_optimizer=1, random_state=0)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)  # a length at its bound: it does not matter
         return process.fit(places, values)
 
 
-def _correlation(processes, count):
-    """Second moments (k, k) of errors left out of `count` runs over what processes give, shrunk; alone at least 1."""
+def _correlation(standardised):
+    """Second moments (k, k) of errors (n, k) over what their processes give, shrunk; on the diagonal 1 where less."""
     from sklearn.covariance import ledoit_wolf
 
-    if not processes:
+    if not standardised.shape[1]:
         return np.zeros((0, 0))
-    standardised = np.empty((count, len(processes)))
-    for column, process in zip(standardised.T, processes, strict=True):
-        found, variance = _left_out(process)
-        column[:] = (process.y_train_ - found) / np.sqrt(variance)
     moments = ledoit_wolf(standardised, assume_centered=True)[0]
     own = np.sqrt(np.maximum(1.0, 1 / np.maximum(np.diag(moments), 1e-12)))
     return moments * np.outer(own, own) + 1e-9 * np.eye(len(own))
 
 
-def _unseen(places, unit, processes):
-    """Errors and deviations (n, k) of components of runs that took no part, and their squared distances (n,)."""
-    errors, deviation, distances = np.zeros(unit.shape), np.ones(unit.shape), np.zeros(len(unit))
-    order = np.random.default_rng(0).permutation(len(unit))
-    for fold in range(FOLDS if processes else 0):
-        out = order[fold::FOLDS]
-        seen = np.setdiff1d(order, out)
-        there = [_process(places[seen], v[seen], start) for v, start in zip(unit.T, processes, strict=True)]
-        found = [process.predict(places[out], return_std=True) for process in there]
-        mean, deviation[out] = (np.column_stack(part) for part in zip(*found, strict=True))
-        errors[out] = unit[out] - mean
-        standardised = errors[out] / deviation[out]
-        inverse = np.linalg.inv(_correlation(there, len(seen)))
-        distances[out] = np.einsum("ni,ij,nj->n", standardised, inverse, standardised)
-    return errors, deviation, distances
-
-
-def _spread(distances, count):
-    """The most probable distribution of errors by their squared distances in `count` components.
-
-    Over their number they are distributed as a factor times Fisher's F(count, degrees of freedom).
-    """
-    if not count:
-        return Spread(1.0, FREEDOM[1])
-    mean = distances / count
-
-    def improbable(logarithms):
-        factor, freedom = np.exp(logarithms)
-        return -np.sum(stats.f.logpdf(mean / factor, count, freedom) - logarithms[0])
-
-    bounds = ((-5.0, 10.0), tuple(np.log(FREEDOM)))
-    found = minimize(
-        improbable, (np.log(np.median(mean) + 1e-9).clip(-5, 10), np.log(8.0)), bounds=bounds, method="Nelder-Mead"
-    )
-    return Spread(*np.exp(found.x).tolist())
-
-
 def _left_out(process):
-    """Mean and variance at each run from all others, (n,) each, for the noise and lengths of all."""
+    """Error and variance at each run from all others, (n,) each, for the noise and lengths of all."""
     inverse = cho_solve((process.L_, True), np.eye(len(process.L_)))
     variance = 1 / np.diag(inverse)
-    return process.y_train_ - process.alpha_ * variance, variance
+    return process.alpha_ * variance, variance

@@ -19,17 +19,12 @@ Array = NDArray[np.float64]
 SHARE_EFFECTIVE = 0.5
 #: Random walks of every draw after each step, and after the last one.
 MOVES, LAST_MOVES = 6, 20
-#: Sizes of the emulator's error over which the likelihood is a mean.
-SIZES = 16
 #: Share of moves that is aimed at: Roberts, Gelman & Gilks (1997).
 ACCEPTED = 0.3
 
 
 class Likelihood:
-    """Probability of what was measured, by an emulator whose outputs it is.
-
-    Errors of the measurements are normal; those of the emulator are, too, of a size that is drawn anew for each run, as
-    its `spread` says: the likelihood is the mean over these sizes.
+    """Probability of what was measured, by an emulator whose outputs it is: normal errors of both.
 
     Parameters
     ----------
@@ -40,9 +35,8 @@ class Likelihood:
 
     Notes
     -----
-    Of the covariance C = A + f V S V', that of the components' errors, S, depends on the parameters, and f is the
-    size. With the differences whitened by A, and Q R = A^-1/2 V, what lies outside of Q is constant; k by k matrices
-    I + f R S R' remain, whose eigenvectors are those of R S R' for every f.
+    Of the covariance C = A + V S V', only that of the components' errors, S, depends on the parameters. With the
+    differences whitened by A, and Q R = A^-1/2 V, what lies outside of Q is constant, and k by k matrices remain.
     """
 
     def __init__(self, emulator: Emulator, measured: Array, covariance: Array):
@@ -54,15 +48,14 @@ class Likelihood:
         self._difference = directions.T @ difference
         self._outside = float(difference @ difference - self._difference @ self._difference)
 
-    def _terms(self, components, sizes):
-        """Squared differences over their covariance and logarithms of its determinant, (p, n) each, at n sizes."""
+    def _terms(self, components):
+        """Squared differences over their covariance and logarithm of its determinant, (p,) each."""
         mean, deviation = components
         left = self._difference - mean @ self._along.T
         parts = self._along * deviation[:, None, :]
-        own, vectors = np.linalg.eigh(parts @ self._emulator.correlation @ parts.swapaxes(1, 2))
-        along = np.einsum("pi,pij->pj", left, vectors) ** 2
-        whole = 1 + np.maximum(own, 0.0)[:, None, :] * sizes[:, None]
-        return np.sum(along[:, None, :] / whole, axis=2), np.log(whole).sum(axis=2)
+        matrix = np.eye(left.shape[1]) + parts @ self._emulator.correlation @ parts.swapaxes(1, 2)
+        square = np.einsum("pi,pi->p", left, np.linalg.solve(matrix, left[..., None])[..., 0])
+        return square, np.linalg.slogdet(matrix)[1]
 
     def logarithm(self, places: Array) -> Array:
         """Logarithm of the likelihood at places (p, d) but for a constant, (p,)."""
@@ -70,14 +63,12 @@ class Likelihood:
 
     def logarithm_of(self, components: tuple[Array, Array]) -> Array:
         """The same where the emulator gives these means and deviations (p, k) of its components."""
-        sizes = self._emulator.spread.factors((np.arange(SIZES) + 0.5) / SIZES)
-        square, determinant = self._terms(components, sizes)
-        return logsumexp(-0.5 * (square + determinant), axis=1) - np.log(SIZES)
+        square, determinant = self._terms(components)
+        return -0.5 * (square + determinant)
 
     def chi_square(self, places: Array) -> Array:
         """Squared differences over their covariance at places (p, d), (p,)."""
-        sizes = np.array([self._emulator.spread.variance])
-        return self._terms(self._emulator.components(places), sizes)[0][:, 0] + self._outside
+        return self._terms(self._emulator.components(places))[0] + self._outside
 
 
 class Sample(NamedTuple):

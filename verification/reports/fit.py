@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import binom, qmc
 
-from coupling.fits.emulator import Emulator, Spread
+from coupling.fits.emulator import Emulator
 from coupling.fits.ensemble import read_ensemble
 from coupling.fits.fit import LEVELS, observe
 from coupling.fits.posterior import Likelihood
@@ -23,8 +23,6 @@ from verification.small_event import small_scene
 
 #: Runs that an emulator is made of; parts of all runs that are truths in turn.
 SIZES, PARTS = (32, 64, 96), 4
-#: Runs of the fit that is repeated with normal errors of the emulator.
-NORMAL = 64
 #: Places over the prior whose weights make a posterior.
 PLACES = 8192
 #: Of each value, one standard deviation.
@@ -122,28 +120,19 @@ def _quantiles(values, weights, shares):
     return np.interp(shares, np.cumsum(weights[order]), values[order])
 
 
-def trials_of(plan, ensemble, size, kinds):
-    """Every run once as the truth, of a fit of `size` of the runs of the other parts.
-
-    kinds : of the emulator's errors: "as found", or "normal" and as large as leave-one-out says, instead of its
-    `spread`. Returns a list of dict, one for each.
-    """
+def trials_of(plan, ensemble, size):
+    """Every run once as the truth, of a fit of `size` of the runs of the other parts; list of :meth:`Fitted.trial`."""
     rng = np.random.default_rng(3)
-    order, spreads, trials = rng.permutation(len(ensemble.places)), [], {kind: [] for kind in kinds}
+    order, trials = rng.permutation(len(ensemble.places)), []
     for part in range(PARTS):
         truths = order[part::PARTS]
         others = rng.permutation(np.setdiff1d(order, truths))[:size]
         fitted = Fitted(plan, some_of(ensemble, others))
-        emulator = fitted.observed.emulator
-        spreads.append(emulator.spread._asdict())
-        for kind in kinds:
-            if kind == "normal":
-                emulator.spread = Spread(1.0, 1e9)
-            for k in truths:
-                ends = {name: ensemble.curves[name][k, -1] for name in PREDICTED}
-                trials[kind].append(fitted.trial(ensemble.places[k], ensemble.measured[k], ends, int(k)))
-        print(f"{size} runs, part {part + 1} of {PARTS}: {spreads[-1]}", flush=True)
-    return [{"size": size, "errors": kind, "spreads": spreads, "trials": trials[kind]} for kind in kinds]
+        for k in truths:
+            ends = {name: ensemble.curves[name][k, -1] for name in PREDICTED}
+            trials.append(fitted.trial(ensemble.places[k], ensemble.measured[k], ends, int(k)))
+        print(f"{size} runs, part {part + 1} of {PARTS}", flush=True)
+    return trials
 
 
 def held(shares):
@@ -154,43 +143,32 @@ def held(shares):
 def coverage_rows(plan, found):
     """How many trials hold the truth: of each parameter, with the band's mean width, of all, of what is predicted."""
 
-    def told(count, one):
-        return f"{count} of {len(one['trials'])} ({count / len(one['trials']):.0%})"
+    def told(inside):
+        return f"{sum(inside)} of {len(inside)} ({np.mean(inside):.0%})"
 
     rows = []
     for k, name in enumerate(plan.parameters):
-        columns = [[held(trial["below"][k]) for trial in one["trials"]] for one in found]
-        widths = [np.mean([trial["widths"][k] for trial in one["trials"]]) for one in found]
-        rows.append((name, *(f"{told(sum(column), one)}, {width:.0%} wide"
-                             for column, width, one in zip(columns, widths, found, strict=True))))  # fmt: skip
-    rows.append(("most probable region of all", *(told(sum(t["region"] for t in one["trials"]), one) for one in found)))
+        widths = (np.mean([trial["widths"][k] for trial in trials]) for trials in found)
+        inside = ([held(trial["below"][k]) for trial in trials] for trials in found)
+        rows.append((name, *(f"{told(one)}, {width:.0%} wide" for one, width in zip(inside, widths, strict=True))))
+    rows.append(("most probable region of all", *(told([trial["region"] for trial in trials]) for trials in found)))
     for name in PREDICTED:
-        counts = [sum(held(trial["predicted"][name]) for trial in one["trials"]) for one in found]
-        label = f"predicted {shown(name)[0]}"
-        rows.append((label, *(told(count, one) for count, one in zip(counts, found, strict=True))))
-    return rows
-
-
-def spread_rows(found):
-    """Of the fits of every size: how errors of runs that were not seen are distributed."""
-    rows = []
-    for one in found:
-        cells = [", ".join(f"{spread[key]:.2f}" for spread in one["spreads"]) for key in ("factor", "freedom")]
-        effective = [trial["effective"] for trial in one["trials"]]
-        rows.append((one["size"], *cells, f"{np.median(effective):.0f}, {min(effective):.0f} at least"))
+        inside = ([held(trial["predicted"][name]) for trial in trials] for trials in found)
+        rows.append((f"predicted {shown(name)[0]}", *map(told, inside)))
+    effective = ([trial["effective"] for trial in trials] for trials in found)
+    rows.append(("effective places", *(f"{np.median(one):.0f}, {min(one):.0f} at least" for one in effective)))
     return rows
 
 
 def main(folder="fit-coverage"):
     """Run, fit and write the page."""
     begin = clock.perf_counter()
-    page = docs_page("fit-coverage", "made", "coverage", "spreads", "emulators")
+    page = docs_page("fit-coverage", "made", "coverage", "emulators")
     plan = read_plan(PLAN)
     seconds = run_all(Path(folder), plan)
     given = measurements(*([1.0] * sum(len(row[-1]) for row in MEASURED),) * 2)
     ensemble = read_ensemble(plan, given, Path(folder) / "ensemble")
-    found = {size: trials_of(plan, ensemble, size, ("as found", "normal")[: 1 + (size == NORMAL)]) for size in SIZES}
-    found, normal = [one[0] for one in found.values()], found[NORMAL][1]
+    found = [trials_of(plan, ensemble, size) for size in SIZES]
     emulator = observe(ensemble).emulator
     wall, runs = clock.perf_counter() - begin, len(ensemble.places)
     made = made_by("python -m verification.reports.fit")
@@ -202,17 +180,14 @@ def main(folder="fit-coverage"):
         (one.quantity, one.place_text, f"{one.time:g} s", f"{error:.3g} {one.unit}", f"{explained:.1%}", f"{own:.2f}")
         for one, error, explained, own in zip(given, *emulator.validation, strict=True)
     ]
-    sizes = [f"{size} runs" for size in SIZES]
-    rows = coverage_rows(plan, [*found, normal])
+    coverage = table(("90 % band of", *(f"{size} runs" for size in SIZES)), coverage_rows(plan, found))
     page.fill({
         "made": f"{made} {cost}",
-        "coverage": table(("90 % band of", *sizes, f"{NORMAL} runs, normal errors"), rows),
-        "spreads": table(("runs", "factor of the variance", "degrees of freedom", "effective places"),
-                         spread_rows(found)),
+        "coverage": coverage,
         "emulators": table(("measured", "where", "when", "error left out", "variance explained", "error over its own"),
                            checks),
     })  # fmt: skip
-    print("\n".join(table(("band of", *sizes, "normal"), rows)), cost, sep="\n")
+    print("\n".join(coverage), cost, sep="\n")
 
 
 if __name__ == "__main__":
