@@ -61,14 +61,14 @@ class CapacityRule(Input):
 
 
 class StabilityRule(Input):
-    """How the tunnel is set against the ground that holds it down and bears it; every value is the user's.
+    """How the tunnel is set against the ground that holds it down and bears it; factors are the user's.
 
     Parameters
     ----------
-    cover : float
-        Ground above the crown [m].
-    buoyant_unit_weight : float
-        Of that ground in water [N/m3].
+    cover : float, optional
+        Ground above the crown [m]; left out, that of the tunnel in the scene.
+    buoyant_unit_weight : float, optional
+        Of that ground in water [N/m3]; left out, its mean in the scene, vertical effective stress over depth.
     uplift_factor, weight_factor : float
         Partial factors of the water's uplift and of what holds the tunnel down [-]: 1.0 and 0.9 are recommended in
         EN 1997-1, Table A.15.
@@ -76,8 +76,8 @@ class StabilityRule(Input):
         Of the bearing resistance of the ground [-]: 1.4 in EN 1997-1, Table A.5, set R2.
     """
 
-    cover: float = Field(gt=0)
-    buoyant_unit_weight: float = Field(gt=0)
+    cover: float | None = Field(default=None, gt=0)
+    buoyant_unit_weight: float | None = Field(default=None, gt=0)
     uplift_factor: float = Field(gt=0)
     weight_factor: float = Field(gt=0)
     bearing_factor: float = Field(gt=0)

@@ -16,12 +16,24 @@ from scipy.sparse.linalg import splu
 from structure.discrete import DiscreteLining
 from structure.inputs import InputError
 from structure.lining import THETA
+from structure.ring import Ring
 from structure.ring_forces import springs_at
 
 #: Angles of the outer face at which displacements are kept; linear in between.
 FACE = np.radians(np.arange(0, 360, 0.5))
 #: Share of the largest eigenvalue of their scalar products below which answers count as combinations of the others.
 DEPENDENT = 1e-12
+
+
+def check_movable(ring: Ring) -> None:
+    """Refuse a ring that cannot move in the ground. Raises structure.InputError."""
+    if ring.neighbour is not None:
+        raise InputError("ring: neighbour must be left out of a ring that moves in the ground, got one")
+    if ring.joint_contact == "face":
+        raise InputError(
+            "ring: joint_contact must be 'section' for a ring that moves in the ground, got 'face'; give"
+            " joint_contact_height and joint_contact_only instead"
+        )
 
 
 class ReducedRing:
@@ -56,13 +68,7 @@ class ReducedRing:
     def __init__(self, lining: DiscreteLining, density: float, gravity: float, n_harmonics: int = 8):
         ring, parts = lining.ring, lining.parts
         self.outer_radius, self.radius = ring.outer_radius, ring.centre_radius
-        if lining.beside is not None:
-            raise InputError("ring: neighbour must be left out of a ring that moves in the ground, got one")
-        if parts.faces is not None:
-            raise InputError(
-                "ring: joint_contact must be 'section' for a ring that moves in the ground, got 'face'; give"
-                " joint_contact_height and joint_contact_only instead"
-            )
+        check_movable(ring)
         self.law, self.bolt_law = parts.law, parts.bolt_law
         self.joints_linear = self.law.linear and self.bolt_law is None
         mass, rigid = density * parts.mass, parts.rigid.T

@@ -80,11 +80,14 @@ def stability_checks(response: xr.Dataset, rule: StabilityRule, ring: Ring) -> d
     Raises
     ------
     ValueError
-        The response has no water_uplift or soil_support: that of an earlier version.
+        The response has no water_uplift or soil_support: that of an earlier version; or no scene gave what the rule
+        leaves out.
     """
     missing = [name for name in ("water_uplift", "soil_support") if name not in response]
     if missing:
         raise ValueError(f"check: stability needs {' and '.join(missing)} in the response, got none; respond again")
+    if left_out := [key for key in ("cover", "buoyant_unit_weight") if getattr(rule, key) is None]:
+        raise ValueError(f"check: stability.{left_out[0]} must be given where no scene has it, got none; state it")
     width = ring.outer_diameter
     of_ring = ring.concrete_unit_weight * math.pi * (ring.outer_radius**2 - (ring.inner_diameter / 2) ** 2)
     above = rule.buoyant_unit_weight * (width * (rule.cover + width / 2) - math.pi * width**2 / 8)

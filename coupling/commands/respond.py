@@ -66,7 +66,7 @@ def respond_command(
         answers = []
         for source, target in zip(sources, targets, strict=True):
             response = responses.respond_by_name(source.ring, source.pressures, backend)
-            response = responses.with_checks(response, source.limits if given is None else given)
+            response = responses.with_checks(response, source.limits(given))
             found = summarise_response(response)
             found["file"] = str(responses.store_response(response, source, name, target))
             if found["utilisations"]:

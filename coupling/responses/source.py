@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from coupling.datasets import RunFileError, opened, run_file
 from coupling.datasets.geometry import on_tunnel, tunnels_beside
 from coupling.refused import SceneError
-from coupling.scenes.rings import ring_of
+from coupling.scenes.rings import gate_tunnel, limits_at, ring_of
 from coupling.scenes.scene import Scene, load_scene, parse_scene
 from structure.inputs import mistakes, refusal
 from structure.limits import Limits
@@ -21,7 +21,7 @@ class Source(NamedTuple):
     """Pressures (time, theta) [Pa] of one tunnel and the ring they act on.
 
     is_own : whether they are the group /lining of a run and the ring is that run's own, so that the response belongs
-    into the run;  tunnel : None: the only one, or that with the gate;  limits : those of the scene with the ring.
+    into the run;  tunnel : None: the only one, or that with the gate;  scene : that with the ring, None without.
     """
 
     file: Path
@@ -29,7 +29,14 @@ class Source(NamedTuple):
     pressures: xr.Dataset
     ring: Ring
     tunnel: int | None = None
-    limits: Limits | None = None
+    scene: Scene | None = None
+
+    def limits(self, given: Limits | None = None) -> Limits | None:
+        """Limits that are given, else those of the scene; what they leave out is that of the scene at the tunnel."""
+        if self.scene is None:
+            return given
+        number = gate_tunnel(self.scene) if self.tunnel is None else self.tunnel
+        return limits_at(self.scene, number, self.scene.limits if given is None else given)
 
 
 def read_source(path: str | Path, scene: str | None = None) -> Source:
@@ -84,7 +91,7 @@ def _source(file, is_run, pressures, root, own, chosen, tunnel):
     except ValueError as problem:
         raise RunFileError(f"'{file}': {problem}") from problem
     is_own = is_run and own is not None and own.ring is not None and _ring(file, root, own, tunnel) == ring
-    return Source(file, is_own, checked, ring, tunnel, None if chosen is None else chosen.limits)
+    return Source(file, is_own, checked, ring, tunnel, chosen)
 
 
 def _ring(file, root, scene, tunnel):

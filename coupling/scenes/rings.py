@@ -10,7 +10,7 @@ from coupling.refused import SceneError
 from mpm.quantities import quantity_in
 from mpm.scene import Scene as MpmScene
 from structure.inputs import Mistake, mistakes
-from structure.limits import OWN
+from structure.limits import OWN, Limits
 from structure.response import RESPONSE
 from structure.ring import Ring
 
@@ -113,6 +113,17 @@ def ring_of(scene: Scene, tunnel: int) -> Ring:
     except ValidationError as error:
         said = "; ".join(message for _, message in mistakes(error, Ring))
         raise SceneError(f"scene '{scene.name}', ring of tunnel {tunnel}: {said}") from None
+
+
+def limits_at(scene: Scene, tunnel: int, limits: Limits | None) -> Limits | None:
+    """Limits of a tunnel's ring; what their stability leaves out is that of the scene there."""
+    if limits is None or limits.stability is None or not scene.tunnels:
+        return limits
+    cover = scene.tunnels[tunnel].cover
+    known = {"cover": cover, "buoyant_unit_weight": scene.vertical_stress(cover) / cover}
+    rule = limits.stability
+    rule = rule.model_copy(update={key: value for key, value in known.items() if getattr(rule, key) is None})
+    return limits.model_copy(update={"stability": rule})
 
 
 def ground_at_axis(scene: MpmScene, depth: float) -> dict[str, float]:

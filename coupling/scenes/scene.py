@@ -135,12 +135,9 @@ class Scene(Input, MpmScene):
             return self
         if self.ring is None:
             raise ValueError("lining: 'jointed' must come with a ring, got none; add [ring], or choose 'elastic'")
-        if self.ring.neighbour is not None or self.ring.joint_contact == "face":
-            what = "neighbour" if self.ring.neighbour is not None else "joint_contact = 'face'"
-            raise ValueError(
-                f"lining: 'jointed' must come with a ring alone whose joints act by sections, got {what}; leave it out"
-                " of [ring], or choose another lining and respond to its pressures"
-            )
+        from structure.reduced import check_movable
+
+        check_movable(self.ring)
         return self
 
     def jointed_ring(self, tunnel: Tunnel) -> Any:

@@ -13,8 +13,10 @@ from coupling import SceneError
 from coupling.datasets import read_response
 from coupling.figures import draw_run
 from coupling.postprocess.summary import summarise_response
+from coupling.responses.respond import respond
 from coupling.scenes.plausibility import warnings_of
 from structure import Limits, check, utilisations
+from verification.loads import theory_pressures
 from verification.synthetic_run import write_run
 
 LIMITS = """
@@ -104,6 +106,19 @@ def test_limits_that_mean_nothing_are_refused_before_a_run(tmp_path, text, messa
     path.write_text('base = "quick"\n' + text, encoding="utf-8")
     with pytest.raises(SceneError, match=message):
         coupling.load_scene(path)
+
+
+def test_stability_takes_cover_and_unit_weight_of_the_scene():
+    factors = {"uplift_factor": 1.0, "weight_factor": 0.9, "bearing_factor": 1.4}
+    scene = coupling.load_scene("quick", limits={"stability": factors})
+    soil, cover = scene.soils[0], scene.tunnels[0].cover
+    buoyant = (1 - soil.porosity) * (soil.grain_density - scene.water.density) * scene.gravity
+    given = {"cover": cover, "buoyant_unit_weight": buoyant}
+    loads = theory_pressures(scene)
+    derived, stated = (respond(each, loads) for each in (scene, scene.changed(limits={"stability": factors | given})))
+    for name in ("flotation_utilisation", "ground_bearing_utilisation"):
+        xr.testing.assert_allclose(derived[name], stated[name], rtol=1e-12)
+    assert json.loads(derived.attrs["limits"])["stability"]["cover"] == cover
 
 
 def test_millimetres_without_their_unit_are_warned_of(scene):

@@ -256,6 +256,11 @@ def test_bearing_of_the_ground_by_hand():
     assert bearing_resistance(1e4, 0.0, 0.0, 0.0) == pytest.approx(1e4 * (np.pi + 2))
 
 
+def test_stability_without_a_scene_needs_cover_and_unit_weight():
+    with pytest.raises(ValueError, match=r"stability\.cover must be given where no scene has it"):
+        check(BeamSpringLining(ring()).respond(pressures()), stable(cover=None))
+
+
 def test_stability_needs_ground():
     with pytest.raises(ValueError, match="stability must be left out of a ring without ground"):
         check(BeamSpringLining(ring(ground=None, balance_uplift=True)).respond(pressures()), stable())

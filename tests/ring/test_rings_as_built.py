@@ -161,11 +161,7 @@ def test_scene_takes_a_ring_as_it_is_built(tmp_path):
         ("[-6, 0, 0, 0, 0, 6]", "[-6, 6]", "joint_inclinations must be one for all joints or 6"),
         ("offset =", "ofset =", "did you mean 'offset'"),
         ("rotation = 30, ", "", "rotation missing"),
-        (
-            'base = "quick"',
-            'base = "quick"\nlining = "jointed"',
-            "a ring alone whose joints act by sections, got neigh",
-        ),
+        ('base = "quick"', 'base = "quick"\nlining = "jointed"', "neighbour must be left out of a ring that moves"),
     ],
 )
 def test_mistakes_in_a_ring_as_built_are_told(tmp_path, old, new, message):
