@@ -58,3 +58,27 @@ def test_every_group_of_a_run_is_read_as_by_xarray(tmp_path):
     for group in groups:
         with xr.open_dataset(run, group=group, engine="h5netcdf", decode_times=False) as theirs:
             xr.testing.assert_identical(read_group_at_once(run, group), theirs.load())
+
+
+def test_dimensions_of_the_group_above_and_attributes_of_all_kinds_are_read_as_by_xarray(tmp_path):
+    path = tmp_path / "kinds.nc"
+    with h5netcdf.File(path, "w") as file:
+        file.dimensions = {"time": None, "joint": 2, "alone": 3}
+        group = file.create_group("inner")
+        group.create_variable("opening", ("time", "joint"), "f8", fillvalue=-9.0)
+        group.create_variable("count", (), "i4")[...] = 7
+        file.resize_dimension("time", 2)
+        group["opening"][:] = [[1.0, 2.0], [3.0, -9.0]]
+        kinds = {"one": np.array([2.5]), "two": np.array([1, 2]), "words": ["a", "b"], "word": ["a"], "none": ""}
+        group.attrs.update(kinds)
+        group["opening"].attrs.update({**kinds, "fixed": np.bytes_("metre")})
+    for name in (None, "inner"):
+        with xr.open_dataset(path, group=name, engine="h5netcdf", decode_times=False) as theirs:
+            xr.testing.assert_identical(read_group_at_once(path, name), theirs.load())
+
+
+def test_a_variable_without_dimensions_for_its_axes_is_refused(tmp_path):
+    with h5py.File(tmp_path / "bare.nc", "w") as file:
+        file["pressure"] = [1.0, 2.0]
+    with pytest.raises(ValueError, match="pressure"):
+        read_group_at_once(tmp_path / "bare.nc")
