@@ -10,6 +10,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from mpm.machine.compile_options import compare_quickly
 from mpm.machine.kernel_cache import KernelCache, kernel_folder, variant_name
 
 # contract: fused multiply-add; nsz, arcp: harmless reordering. No "nnan" or "ninf": the
@@ -19,6 +20,7 @@ FAST_MATH = {"contract", "nsz", "arcp"}
 # pass out by default; NUMBA_SLP_VECTORIZE in the environment decides where it is set.
 if "NUMBA_SLP_VECTORIZE" not in os.environ:
     numba.config.SLP_VECTORIZE = 1
+compare_quickly()
 # forceinline: kernels that call others are one piece of machine code with them. Were the others code of their own, the
 # process that compiles would call that, and those that load what it compiled the copies that come with the caller,
 # which were optimised once more: other bits.

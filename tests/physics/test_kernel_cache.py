@@ -127,3 +127,17 @@ assert "outer" in code
 print("calls" if any(" call " in line and "inner" in line for line in code.splitlines()) else "alone")
 """)
     assert printed(program()) == ["alone"]
+
+
+def test_options_of_kernels_are_compared_and_hashed_as_numba_does():
+    from numba.core.compiler import Flags
+
+    from mpm.machine import compile_options
+
+    plain, named, other = Flags(), Flags(), Flags()
+    named.nrt, other.forceinline = plain.nrt, True  # the same by default, and another
+    for one in (plain, named, other):
+        for two in (plain, named, other):
+            assert compile_options.equal(one, two) == (one.values() == two.values())
+        assert compile_options.hash_of(one) == compile_options._hash(one)
+    assert plain == named != other and Flags.__eq__ is compile_options.equal
