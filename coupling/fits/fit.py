@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from scipy.stats import chi2, qmc
+from threadpoolctl import threadpool_limits
 
 from coupling.files.provenance import origin, with_history
 from coupling.fits.emulator import SMALLEST_SPREAD, Emulator, require_scikit_learn
@@ -94,6 +95,7 @@ def fit(
     return fitted(plan, given, read_ensemble(plan, given, folder))
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")  # matrices of a hundred rows: other threads only wait
 def fitted(plan: FitPlan, given: tuple[Measurement, ...], ensemble: Ensemble) -> xr.Dataset:
     """The dataset of :func:`fit` from runs that are done."""
     observed = observe(ensemble)
