@@ -1,7 +1,5 @@
 """What a file or folder is, for somebody who finds it: kind, content, and what to do with it."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from pathlib import Path

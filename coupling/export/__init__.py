@@ -1,7 +1,5 @@
 """A run for other programs: fields over time for ParaView and PyVista, an animation, tables, pictures."""
 
-from __future__ import annotations
-
 import contextlib
 import fnmatch
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Fields around the tunnel as an animation, one picture a snapshot."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from coupling.datasets.geometry import has_tunnels

@@ -1,7 +1,5 @@
 """Diagrams around a ring, the crown up: axes, ticks, legend, closed curves."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 

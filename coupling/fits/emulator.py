@@ -1,7 +1,5 @@
 """What a run would give, from what others gave: a Gaussian process for each output or component, and its error."""
 
-from __future__ import annotations
-
 import warnings
 from typing import NamedTuple
 

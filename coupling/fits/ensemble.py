@@ -1,7 +1,5 @@
 """The runs of a fit: what each gives where something was measured, and what follows from it over time."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Parameters of a scene from measurements: runs, emulators, posterior, and bands of what follows."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """What measurements say of the parameters: the likelihood of an emulator, and draws from the posterior distribution."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

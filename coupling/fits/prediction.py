@@ -1,7 +1,5 @@
 """What follows from parameters: bands over time, times to limits, and which parameter decides."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A fit in numbers: what the command shows and gives as JSON."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How far a run is from what was measured: residuals in errors, and chi square per measurement, by quantity."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

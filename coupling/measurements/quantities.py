@@ -1,7 +1,5 @@
 """What can be measured: the quantities, where a run holds them, and what names a place of each."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Measurements from a table (CSV), a netCDF-4 file or a dataset; what is wrong in them is named by its line."""
 
-from __future__ import annotations
-
 import csv
 import difflib
 from collections.abc import Iterator

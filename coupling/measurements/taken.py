@@ -1,7 +1,5 @@
 """A run's values where and when something was measured."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray

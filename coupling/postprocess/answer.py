@@ -1,7 +1,5 @@
 """What a run comes to: the check that governs, the largest forces of the event with place and time, the trough."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How far forces of a run are from an infinitely fine mesh, by the ladder that `gush accuracy --scene` leaves."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

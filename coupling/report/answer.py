@@ -1,7 +1,5 @@
 """What a page begins with: the governing check, the largest forces and what is known of their error, inflow, trough."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

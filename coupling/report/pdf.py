@@ -1,7 +1,5 @@
 """A page as PDF, printed by an installed Chromium or Chrome without a window."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

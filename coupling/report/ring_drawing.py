@@ -1,7 +1,5 @@
 """The ring of a tunnel as the page draws it: segments, the key, joints with their numbers, the gate; radius 100."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A run repeated from what its file says, and compared bit for bit with it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

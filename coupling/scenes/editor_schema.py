@@ -4,8 +4,6 @@ It is pydantic's schema of :class:`coupling.Scene`, with what a file may say bey
 "none", entries of a list by their numbers. What a file must say depends on its base, so nothing is required.
 """
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections.abc import Iterator

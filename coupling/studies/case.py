@@ -1,7 +1,5 @@
 """One case of a study: run, answered by the lining models, taken at fixed inflow masses; made to run anywhere."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The cases of a study: scenes that differ in its parameters, each under a key of all that decides its result."""
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import dataclass
 from functools import cache

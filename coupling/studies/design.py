@@ -1,7 +1,5 @@
 """What a study is: a base scene, parameters by their dotted names, and which combinations of them are run."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import math

@@ -1,7 +1,5 @@
 """JSON Schema of study files, see :mod:`coupling.scenes.editor_schema`."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from coupling.scenes.editor_schema import dotted_names, file_schema, with_unit

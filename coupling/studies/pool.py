@@ -1,7 +1,5 @@
 """Worker processes on this machine: each runs one call after the other, and a lost one costs only its call."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal

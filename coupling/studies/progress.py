@@ -1,7 +1,5 @@
 """How far a study is: each case writes its state into its folder, whoever shares the folder can read them all."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import threading

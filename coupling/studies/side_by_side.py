@@ -1,7 +1,5 @@
 """Runs that were made apart, beside each other as the cases of a study are: at equal inflow mass, or at equal time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple

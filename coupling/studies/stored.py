@@ -1,7 +1,5 @@
 """What `gush study` does."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Ladders of settings over verification problems: error against processor time."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import asdict

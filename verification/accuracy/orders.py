@@ -1,7 +1,5 @@
 """Observed orders, Pareto fronts and extrapolation to a mesh of size zero."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

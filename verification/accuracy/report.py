@@ -1,7 +1,5 @@
 """What `gush accuracy` does with problems: measure their ladders; a page with one table of all, a picture a problem."""
 
-from __future__ import annotations
-
 import difflib
 import math
 from pathlib import Path

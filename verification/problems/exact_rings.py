@@ -4,8 +4,6 @@ Signs as in :mod:`structure.response`. Thin ring of centre-line radius R, inexte
 unless said otherwise; here theta is in radians from the crown, clockwise.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The band of a statement: our number, what each unknown of the source moves it by, and the error of our mesh."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures 19 to 23 of the published study: cases beside each other at 1000 kg/m, by gate, cover and soil."""
 
-from __future__ import annotations
-
 import matplotlib
 import numpy as np
 

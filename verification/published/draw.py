@@ -1,7 +1,5 @@
 """All figures of the published study that the runs at hand have datasets for, as files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import matplotlib

@@ -1,7 +1,5 @@
 """Datasets of one run from which the statements of the published study are answered and its figures drawn."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path

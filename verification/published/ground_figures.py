@@ -1,7 +1,5 @@
 """Figures 6 and 9 to 12 of the published study: settlement, inflow and flow zone, fields and stresses in the ground."""
 
-from __future__ import annotations
-
 import matplotlib
 import numpy as np
 from matplotlib.colors import LogNorm, Normalize, TwoSlopeNorm

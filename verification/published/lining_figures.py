@@ -1,7 +1,5 @@
 """Figures 7 and 13 to 17 of the published study: pressures on the lining and what the ring answers, over the event."""
 
-from __future__ import annotations
-
 import matplotlib
 import numpy as np
 

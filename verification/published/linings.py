@@ -1,7 +1,5 @@
 """The source's lining in its soil computation: how stiff one layer of linear triangles through the lining is."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -1,7 +1,5 @@
 """The page that sets our numbers beside the published ones: blocks that are computed, in a text that is written."""
 
-from __future__ import annotations
-
 import re
 from datetime import UTC, datetime
 from functools import partial

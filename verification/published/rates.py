@@ -1,7 +1,5 @@
 """How fast material comes through a gap by theories of their own: orifice, dry hopper, seepage to a sink."""
 
-from __future__ import annotations
-
 import numpy as np
 
 #: Contraction of a jet behind a sharp-edged slot, pi/(pi + 2) (Kirchhoff 1869).

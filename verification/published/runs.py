@@ -1,7 +1,5 @@
 """All runs of the published study: its cases and twin tunnels, on several meshes, and what it does not state."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 #: How much coarser than that of case 3 meshes are: its second one, the others', that of the unknowns and of a look.

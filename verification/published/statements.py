@@ -1,7 +1,5 @@
 """The statements of the published study on case 3 and the twin tunnels, each a number that must lie in an interval."""
 
-from __future__ import annotations
-
 from functools import cache
 from importlib import resources
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """What the source says of its cases beside each other, answered one by one at 1000 kg/m."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the source does not state, varied one at a time: which runs and which rings, and what they say."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import NamedTuple
 
