@@ -15,16 +15,10 @@ BUSY = 15
 def in_a_process(work, seconds):
     """What `work` returns, or how it ended.
 
-    Parameters
-    ----------
-    work : callable
-    seconds : float
-        Processor time that it may take [s].
+    work : callable;  seconds : float, processor time that it may take [s].
 
-    Returns
-    -------
-    str, object
-        "returned" and the value; "raised" and (names of its types, message, traceback); "killed" and the signal's name.
+    Returns str, object: "returned" and the value; "raised" and (names of its types, message, traceback); "killed" and
+    the signal's name.
     """
     read, write = os.pipe()
     child = os.fork()

@@ -22,10 +22,8 @@ def store(comparison, source, out=None):
     Without `out` the folder is `comparison/` beside the file; only files of an earlier comparison are replaced. Tunnels
     without the gate have folders of their own in it.
 
-    Returns
-    -------
-    dict
-        models, times (count), cpu_seconds, rows, differences (path), responses (paths by model), figures (paths).
+    Returns a dict: models, times (count), cpu_seconds, rows, differences (path), responses (paths by model), figures
+    (paths).
 
     Raises Refused: the folder cannot be made, or holds other files under the names that are written.
     """

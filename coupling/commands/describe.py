@@ -17,10 +17,7 @@ SIGNATURES = {b"\x89HDF\r\n\x1a\n": "netcdf", b"\x89PNG\r\n\x1a\n": "picture (PN
 def describe(path: str | Path) -> dict[str, Any]:
     """What a path is.
 
-    Returns
-    -------
-    dict
-        path; kind; bytes (of a file); facts: dict of texts and numbers; next: list of commands that take it.
+    Returns: path; kind; bytes (of a file); facts: dict of texts and numbers; next: list of commands that take it.
 
     Raises Refused: nothing is there; RunFileError, coupling.studies.design.StudyError: a netCDF file or a study that
     cannot be read.

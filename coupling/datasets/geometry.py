@@ -60,10 +60,7 @@ def has_tunnels(dataset: xr.Dataset) -> bool:
 def tunnel_list(dataset: xr.Dataset) -> list[Tunnel]:
     """All tunnels by their numbers.
 
-    Raises
-    ------
-    ValueError
-        The dataset does not say.
+    Raises ValueError: the dataset does not say.
     """
     missing = [name for name in NAMES if name not in dataset.attrs]
     if missing:

@@ -22,20 +22,13 @@ OF_THE_FORMAT = frozenset((
 def read_group_at_once(file, group=None, choose=None):
     """Variables, coordinates and attributes of one group.
 
-    Parameters
-    ----------
-    file : path, file object, or h5py.File that is open
-    group : str or None
-        None: the root.
-    choose : callable or None
-        Takes the values of `time` (n,) [s] and returns the indices that are read: an array, or one number, which drops
-        the dimension. None: all. Called only where the group has `time`.
+    file : path, file object, or h5py.File that is open;
+    group : str or None, None: the root;
+    choose : callable or None, takes the values of `time` (n,) [s] and returns the indices that are read: an array, or
+        one number, which drops the dimension. None: all. Called only where the group has `time`.
 
-    Returns
-    -------
-    xarray.Dataset
-        Decoded by CF but for times. Variables that end early on an unlimited dimension are continued by their fill
-        value.
+    Returns xarray.Dataset: decoded by CF but for times. Variables that end early on an unlimited dimension are
+    continued by their fill value.
 
     Raises KeyError: no such group; OSError, RuntimeError, ValueError, AttributeError: from the libraries, for a damaged
     file.

@@ -48,10 +48,7 @@ def mesh_grids(snapshots: Iterable[xr.Dataset], mesh: xr.Dataset) -> Iterator[me
     Cell data: region, displacement, the means of `ELEMENT_MEANS` (NaN where there is no material), and filled: area of
     the material over that of the element [-].
 
-    Parameters
-    ----------
-    snapshots : list of xarray.Dataset
-    mesh : xarray.Dataset
+    snapshots : list of xarray.Dataset.
     """
     import meshio
 

@@ -43,13 +43,8 @@ class XdmfSeries:
     def append(self, time, mesh):
         """Add one time.
 
-        Parameters
-        ----------
-        time : float
-            [s]
-        mesh : meshio.Mesh
-            One block of cells of `TOPOLOGIES`; points (n, 3); data are scalars, vectors or tensors (n, 9). Arrays that
-            are the same object as at an earlier time are not written again.
+        time : float [s];  mesh : meshio.Mesh, one block of cells of `TOPOLOGIES`; points (n, 3); data are scalars,
+        vectors or tensors (n, 9). Arrays that are the same object as at an earlier time are not written again.
         """
         grid = ET.SubElement(self._series, "Grid", Name=f"{time:.6g} s", GridType="Uniform")
         ET.SubElement(grid, "Time", Value=repr(float(time)))

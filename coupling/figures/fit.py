@@ -20,14 +20,8 @@ COLUMNS = 3
 def fit_bands(fit: xr.Dataset, names: list[str], shown: Callable[[str], tuple[str, str, float]]) -> Picture:
     """A panel for each parameter, one of the measurements, and one for each quantity over time.
 
-    Parameters
-    ----------
-    fit : xarray.Dataset
-        Of :func:`coupling.fits.fit.fit`.
-    names : list of str
-        Quantities that are drawn.
-    shown : callable
-        Label, unit and factor to it of a quantity.
+    fit : of :func:`coupling.fits.fit.fit`;  names : list of str, quantities that are drawn;  shown : label, unit and
+    factor to it of a quantity.
     """
     parameters = fit["parameter"].values.tolist()
     count = len(parameters) + 1 + len(names)

@@ -26,18 +26,10 @@ class CheckpointDamaged(ValueError):
 def write_checkpoint(folder, state, about):
     """Write the state of a simulation; nothing older is given up before it lies safely on the disk.
 
-    Parameters
-    ----------
-    folder : path
-    state : dict of str to array, float, int, bool or str
-        From :meth:`mpm.Simulation.state`.
-    about : dict
-        What JSON can hold: how to recognise the run, and how far its files are.
+    folder : path;  state : dict of str to array, float, int, bool or str, from :meth:`mpm.Simulation.state`;
+    about : dict, what JSON can hold: how to recognise the run, and how far its files are.
 
-    Returns
-    -------
-    path
-        ``checkpoint-STEPS.h5``.
+    Returns path: ``checkpoint-STEPS.h5``.
     """
     import h5py
 
@@ -66,10 +58,7 @@ def checkpoints(folder):
 def read_checkpoint(path):
     """State and `about` of a checkpoint.
 
-    Raises
-    ------
-    CheckpointDamaged
-        Truncated, changed, or no checkpoint at all.
+    Raises CheckpointDamaged: truncated, changed, or no checkpoint at all.
     """
     import h5py
 
@@ -90,18 +79,10 @@ def read_checkpoint(path):
 def last_checkpoint(folder, records, warn):
     """The last checkpoint of a folder that is whole and fits to the run file; damaged ones are set aside.
 
-    Parameters
-    ----------
-    folder : path
-    records : int
-        Records in the run file: a checkpoint that builds on more of them is of no use.
-    warn : callable
-        Called with a message about each one left out.
+    folder : path;  records : int, records in the run file: a checkpoint that builds on more of them is of no use;
+    warn : callable, called with a message about each one left out.
 
-    Returns
-    -------
-    state, about : dict or None
-        None where there is none.
+    Returns state, about : dict or None, None where there is none.
     """
     for path in checkpoints(folder):
         try:

@@ -34,17 +34,10 @@ def default_folder(scene_name):
 def claimed(folder, overwrite=False):
     """Hold a run folder for the time of a run; refuse before anything is touched.
 
-    Parameters
-    ----------
-    folder : str or path
-        Made when absent.
-    overwrite : bool
-        Replace an earlier run's own files; others are left alone.
+    folder : str or path, made when absent;  overwrite : bool, replace an earlier run's own files; others are left
+    alone.
 
-    Raises
-    ------
-    Refused
-        Not a folder, in use by another run, not writable, or not empty and `overwrite` not asked for.
+    Raises Refused: not a folder, in use by another run, not writable, or not empty and `overwrite` not asked for.
     """
     folder = Path(folder)
     try:
@@ -76,10 +69,7 @@ def claimed(folder, overwrite=False):
 def reopened(folder):
     """Hold the folder of an earlier run to continue it; nothing in it is touched.
 
-    Raises
-    ------
-    Refused
-        No run in it, in use by another run, or not writable.
+    Raises Refused: no run in it, in use by another run, or not writable.
     """
     folder = Path(folder)
     if not any((folder / name).is_file() for name in (RUN_FILE, SCENE_FILE)):

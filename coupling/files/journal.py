@@ -133,10 +133,8 @@ def changed(path):
 
     An exception inside leaves the file as it was.
 
-    Raises
-    ------
-    OSError
-        No space or no right to write: the file is as it was, or its journal is complete and `recover` finishes.
+    Raises OSError: no space or no right to write: the file is as it was, or its journal is complete and `recover`
+    finishes.
     """
     path = Path(path)
     recover(path)

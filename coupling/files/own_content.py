@@ -8,16 +8,9 @@ class ForeignContent(ValueError):
 def require_own_content(group):
     """Refuse external links, external storage and virtual datasets; a damaged file raises what the library raises.
 
-    Parameters
-    ----------
-    group : h5py.File or h5py.Group
-        Open; nothing of it has been read yet.
+    group : h5py.File or h5py.Group, open; nothing of it has been read yet.
 
-    Raises
-    ------
-    ForeignContent
-    OSError, KeyError, RuntimeError, ValueError
-        From the library.
+    Raises ForeignContent; OSError, KeyError, RuntimeError, ValueError: from the library.
     """
     import h5py
 

@@ -60,10 +60,7 @@ def solver_sha256():
 def differences(stored, now, names=DECISIVE):
     """Names among `names` whose values differ between two sets of root attributes, with both values.
 
-    Returns
-    -------
-    dict of str to (str, str)
-        Name to the stored and the present value; "unknown" for what is not stored.
+    Returns dict of str to (str, str): name to the stored and the present value; "unknown" for what is not stored.
     """
     stored, now = ({**attributes, **_by_package(attributes.get("versions", ""))} for attributes in (stored, now))
     pairs = {name: (str(stored.get(name, "unknown")), str(now.get(name, "unknown"))) for name in names}

@@ -36,21 +36,10 @@ def predicted(
 ) -> xr.Dataset:
     """Bands of all quantities of the runs over time.
 
-    Parameters
-    ----------
-    plan : FitPlan
-    time : (k,) float64
-        [s].
-    emulators : dict
-        Of :func:`curve_emulators`.
-    places : dict
-        What is known, "prior" or "posterior", to draws of the parameters (p, d), as an :class:`Emulator` takes them.
-    levels : sequence of float
+    time : (k,) float64 [s];  emulators : of :func:`curve_emulators`;  places : what is known, "prior" or "posterior",
+    to draws of the parameters (p, d), as an :class:`Emulator` takes them;  levels : sequence of float.
 
-    Returns
-    -------
-    xarray.Dataset
-        The variables of :func:`coupling.fits.fit.fit` that have a dimension time or limit.
+    Returns: the variables of :func:`coupling.fits.fit.fit` that have a dimension time or limit.
     """
     rng = np.random.default_rng(plan.seed)
     result = xr.Dataset(
@@ -85,10 +74,7 @@ def predicted(
 def sobol(plan: FitPlan, emulators: dict[str, Emulator]) -> xr.Dataset:
     """Sobol indices of all quantities that vary, at the last time, parameters distributed as before measuring.
 
-    Returns
-    -------
-    xarray.Dataset
-        first_order, total_order (quantity, parameter) [-].
+    Returns: first_order, total_order (quantity, parameter) [-].
 
     Source: Saltelli et al. (2010), by scipy.stats.sobol_indices.
     """

@@ -26,18 +26,11 @@ NO_LIMITS = (
 def answer_of_run(tree: xr.DataTree, ladder: xr.Dataset | None = None) -> dict[str, Any]:
     """What `answer.html` shows of a run.
 
-    Parameters
-    ----------
-    tree : xarray.DataTree
-        Of a run, at least one record.
-    ladder : xarray.Dataset or None
-        Of :func:`coupling.postprocess.mesh_ladder.read_ladder`, for the error of the mesh.
+    tree : of a run, at least one record;  ladder : of :func:`coupling.postprocess.mesh_ladder.read_ladder`, for the
+    error of the mesh.
 
-    Returns
-    -------
-    dict
-        rings: list of {title, governing, bad, model, rows, bases, drawing}; facts: list of (what, text); tables: list
-        of (title, headings, rows).
+    Returns: rings: list of {title, governing, bad, model, rows, bases, drawing}; facts: list of (what, text); tables:
+    list of (title, headings, rows).
     """
     found, lining = answers(tree), tree["lining"].to_dataset()
     several = bool(tunnels_beside(lining))

@@ -28,19 +28,10 @@ MOST_IN_DETAIL = 4  # entries of a page that show displacements and joints, too
 def run_states(run, tunnel, records):
     """States of a tunnel of a run at some records.
 
-    Parameters
-    ----------
-    run : xarray.DataTree
-    tunnel : int or None
-        None: that with the gate.
-    records : (n,) int
-        Of `/history`.
+    run : xarray.DataTree;  tunnel : int or None, None: that with the gate;  records : (n,) int, of `/history`.
 
-    Returns
-    -------
-    xarray.Dataset
-        Pressures (progress, theta), histories (progress), responses (progress, model, theta or joint), NaN where a
-        model has no record; time [s] and inflow_mass [kg/m] (progress).
+    Returns xarray.Dataset: pressures (progress, theta), histories (progress), responses (progress, model, theta or
+    joint), NaN where a model has no record; time [s] and inflow_mass [kg/m] (progress).
     """
     import xarray as xr
 
@@ -81,19 +72,10 @@ def shape_of_ring(states):
 def budget(states, count, most, detail):
     """How `count` entries of a page are thinned to fit into it.
 
-    Parameters
-    ----------
-    states : xarray.Dataset
-        Of one of them.
-    count, most : int
-        Entries; records of each at most.
-    detail : bool
-        Whether they show displacements, too.
+    states : xarray.Dataset, of one of them;  count, most : int, entries; records of each at most;  detail : bool,
+    whether they show displacements, too.
 
-    Returns
-    -------
-    int, (n,) int64
-        Every how many values around the ring are taken, and at which of the records.
+    Returns int, (n,) int64: every how many values around the ring are taken, and at which of the records.
     """
     records, of_model = states.sizes["progress"], len(FORCES) + len(MOTION) * detail
     curves = (len(PRESSURES) + of_model * states.sizes.get("model", 0)) * states.sizes.get("theta", 1)
@@ -121,22 +103,14 @@ def rows_at(states, records, stops, along="inflow_mass"):
 def entry(states, answers, records, step, detail):
     """One run, tunnel or case as the page draws it.
 
-    Parameters
-    ----------
-    states : xarray.Dataset
-        From :func:`run_states` or of a case, in memory.
-    answers : list of dict
-        From :func:`ring_series`, one for each lining model.
-    records, step
-        From :func:`budget`.
-    detail : bool
-        Whether displacements and joints are kept.
+    states : xarray.Dataset, from :func:`run_states` or of a case, in memory;
+    answers : list of dict, from :func:`ring_series`, one for each lining model;
+    records, step : from :func:`budget`;
+    detail : bool, whether displacements and joints are kept.
 
-    Returns
-    -------
-    dict
-        records: of the curves' rows; series: name to (n_progress,); curves: name to levels (n_records, n_angles);
-        joint_angle [degree]; models: list of {name, series, curves, joints: name to (n_records, n_joints)}; all SI.
+    Returns a dict: records: of the curves' rows; series: name to (n_progress,); curves: name to levels (n_records,
+    n_angles); joint_angle [degree]; models: list of {name, series, curves, joints: name to (n_records, n_joints)}; all
+    SI.
     """
     kept, series = states.isel(progress=records), [n for n in states.data_vars if states[n].dims == ("progress",)]
     pressures = [name for name in PRESSURES if name in states]

@@ -16,10 +16,7 @@ NEIGHBOURS = 1.35  # how much larger points are drawn when some are left out
 def point_fields(points):
     """Scalars that are drawn on the points of one time.
 
-    Returns
-    -------
-    dict
-        name: (label, unit, values (n,), colour map, "log" or "linear").
+    Returns a dict: name: (label, unit, values (n,), colour map, "log" or "linear").
     """
     data = {name: points[name].values.astype(float) for name in points.data_vars if points[name].dims == ("point",)}
     known = {
@@ -50,19 +47,11 @@ def point_fields(points):
 def field_snapshots(points, budget=BYTES_OF_FIELDS):
     """Snapshots of the points near the tunnel, small enough for a page.
 
-    Parameters
-    ----------
-    points : xarray.Dataset
-        `/points` of a run.
-    budget : float
-        Bytes at most.
+    points : xarray.Dataset, `/points` of a run;  budget : float, bytes at most.
 
-    Returns
-    -------
-    dict or None
-        view: {x, y, half} [m]; fields: name to {label, unit, low, high, log, colours}; snapshots: list of {time,
-        present, drawn, x, y, side, <field> ..}: x and y as 65535ths of the view's width, side (of a square with
-        the point's area) as 255ths of `largest_side`, a field as 255ths of its range. None without snapshots.
+    Returns dict or None: view: {x, y, half} [m]; fields: name to {label, unit, low, high, log, colours}; snapshots:
+    list of {time, present, drawn, x, y, side, <field> ..}: x and y as 65535ths of the view's width, side (of a square
+    with the point's area) as 255ths of `largest_side`, a field as 255ths of its range. None without snapshots.
     """
     if "x" not in points or not points.sizes.get("time"):
         return None
@@ -155,11 +144,8 @@ def _snapshot(near, fields, scales, view, largest, most):
 def mesh_picture(mesh):
     """Nodes and triangles for the page, and what the mesh is made of.
 
-    Returns
-    -------
-    dict
-        elements, nodes (count of all); min_altitude [m]; min_angle [degree]; x, y (n_nodes,), corners (n, 3), region
-        (n,); whole: False where only triangles near the tunnel are kept.
+    Returns a dict: elements, nodes (count of all); min_altitude [m]; min_angle [degree]; x, y (n_nodes,), corners (n,
+    3), region (n,); whole: False where only triangles near the tunnel are kept.
     """
     x, y = mesh["x"].values, mesh["y"].values
     corners, region = mesh["element_nodes"].values, mesh["region"].values
@@ -201,17 +187,10 @@ def _nearest_elements(mesh, corners):
 def section(scene, lining):
     """What the page needs to draw the ground in section.
 
-    Parameters
-    ----------
-    scene : coupling.Scene or None
-    lining : xarray.Dataset
-        `/lining`, whose attributes are tunnels and gate.
+    scene : coupling.Scene or None;  lining : xarray.Dataset, `/lining`, whose attributes are tunnels and gate.
 
-    Returns
-    -------
-    dict
-        tunnels: list of {x, y, outer, inner} [m]; gate: {tunnel, angle [degree], width [m]} or None; box: {width,
-        depth} or None; water_table: depth [m] or None; soils: list of {name, top}.
+    Returns a dict: tunnels: list of {x, y, outer, inner} [m]; gate: {tunnel, angle [degree], width [m]} or None; box:
+    {width, depth} or None; water_table: depth [m] or None; soils: list of {name, top}.
     """
     gate = gate_of(lining)
     return {

@@ -81,18 +81,11 @@ def inflow_rate(history):
 def scatter(values, spread):
     """Standard deviation of one record: of its differences to its neighbours, and within its output interval.
 
-    Parameters
-    ----------
-    values : (n,) float64
-        A quantity over time; the last fifth, at least five records, is used. Differences of neighbours leave its trend
-        out; of independent errors they have twice the variance.
-    spread : float
-        Standard deviation within the last output interval.
+    values : (n,) float64, a quantity over time; the last fifth, at least five records, is used. Differences of
+        neighbours leave its trend out; of independent errors they have twice the variance;
+    spread : float, standard deviation within the last output interval.
 
-    Returns
-    -------
-    float
-        None with fewer than five records.
+    Returns float: None with fewer than five records.
     """
     if len(values) < 5:
         return None
@@ -132,19 +125,10 @@ def _in_gate(lining, theta):
 def ring_numbers(names, answers, prefix=""):
     """Extremes of a ring's forces and deformation at the last record of its first lining model, beside the first.
 
-    Parameters
-    ----------
-    names : list of str
-        Lining models.
-    answers : list of dict
-        Of each: keys of `RING_EXTREMES` to (n_records,) float64, NaN where it has no record.
-    prefix : str
-        Of the keys.
+    names : list of str, lining models;  answers : list of dict, of each: keys of `RING_EXTREMES` to (n_records,)
+    float64, NaN where it has no record;  prefix : str, of the keys.
 
-    Returns
-    -------
-    list of Number
-        Their error is the largest difference from the other models at the same record.
+    Returns list of Number: their error is the largest difference from the other models at the same record.
     """
     first = answers[0] if answers else {}
     known = [np.flatnonzero(np.isfinite(first[key])) for key in RING_EXTREMES if key in first]

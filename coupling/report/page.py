@@ -74,11 +74,7 @@ def write_report(
 def write_runs_report(compared: SideBySide, out: str | Path) -> Path:
     """Write the page about runs side by side.
 
-    Parameters
-    ----------
-    compared : coupling.studies.side_by_side.SideBySide
-    out : str or path
-        The HTML file; an earlier report is replaced, nothing else.
+    out : the HTML file; an earlier report is replaced, nothing else.
 
     Raises Refused: as :func:`write_report`.
     """
@@ -154,10 +150,7 @@ def write_run_reports(folder: str | Path) -> list[Path]:
 def study_folder(path: str | Path) -> Path | None:
     """The folder of a study that a path names; None where it can only be a run.
 
-    Raises
-    ------
-    Refused
-        A folder that holds neither or both.
+    Raises Refused: a folder that holds neither or both.
     """
     from coupling.studies.folder import DATA_FILE, STUDY_FILE
 

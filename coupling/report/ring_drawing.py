@@ -13,19 +13,11 @@ NUMBERS, ANGLES = 112.0, 76.0  # radii at which joints are numbered and their an
 def ring_drawing(tunnel: Tunnel, joints: list[float], gate: Gate | None) -> dict[str, Any]:
     """What the page needs to draw a ring, its y axis pointing down.
 
-    Parameters
-    ----------
-    tunnel : Tunnel
-    joints : list of float
-        Angles from the crown, clockwise, ascending [degree]; empty without joints.
-    gate : Gate or None
-        None where this tunnel has none.
+    joints : list of float, angles from the crown, clockwise, ascending [degree]; empty without joints;  gate : None
+    where this tunnel has none.
 
-    Returns
-    -------
-    dict
-        segments: list of {path, key}; joints: list of {number, angle, ends, label, text}; gate: {angle, half, outer,
-        inner} or None; outer, inner [m].
+    Returns: segments: list of {path, key}; joints: list of {number, angle, ends, label, text}; gate: {angle, half,
+    outer, inner} or None; outer, inner [m].
     """
     inner = 100.0 * tunnel.inner / tunnel.outer
     ends = [(a, b + 360.0 * (b <= a)) for a, b in zip(joints, [*joints[1:], *joints[:1]], strict=True)]

@@ -27,13 +27,10 @@ VERDICTS = {True: "as expected", False: "look at this", None: "–", "poor": "po
 def collect(run, model=None, ladder=None):
     """Everything that the page shows, names as `page.html` uses them.
 
-    Parameters
-    ----------
-    run : str or path
-    model : str, optional
-        Lining model whose numbers lead; left out: that of the run itself, see :func:`structure.models.in_order`.
-    ladder : path, optional
-        Mesh ladder of the scene, see :func:`coupling.postprocess.mesh_ladder.read_ladder`.
+    run : str or path;
+    model : str, optional, lining model whose numbers lead; left out: that of the run itself, see
+        :func:`structure.models.in_order`;
+    ladder : path, optional, mesh ladder of the scene, see :func:`coupling.postprocess.mesh_ladder.read_ladder`.
     """
     with opened(run) as file:
         tree = _led_by(read_run(file), model)

@@ -36,19 +36,10 @@ ALONG = {"inflow_mass": ("inflow mass", "inflow masses", "kg/m"), "time": ("time
 def collect(folder, beside, model=None):
     """Everything that the page shows, names as `page.html` uses them.
 
-    Parameters
-    ----------
-    folder : path
-        Of the study.
-    beside : path
-        Folder of the page: links are relative to it.
-    model : str, optional
-        Lining model whose numbers lead; left out: the study's first.
+    folder : path, of the study;  beside : path, folder of the page: links are relative to it;  model : str, optional,
+    lining model whose numbers lead; left out: the study's first.
 
-    Raises
-    ------
-    coupling.studies.design.StudyError
-        The definition, a scene of it, or what a case left cannot be read.
+    Raises coupling.studies.design.StudyError: the definition, a scene of it, or what a case left cannot be read.
     """
     plan, found, failures = stored_cases(folder)
     models = [model_name(backend) for backend in plan.backends]
@@ -95,12 +86,8 @@ def collect(folder, beside, model=None):
 def collect_runs(compared, beside):
     """Everything that the page about runs side by side shows: they are the cases.
 
-    Parameters
-    ----------
-    compared : coupling.studies.side_by_side.SideBySide
-        Along the inflow mass, or along time: so moves the slider, too.
-    beside : path
-        Folder of the page.
+    compared : coupling.studies.side_by_side.SideBySide, along the inflow mass, or along time: so moves the slider, too;
+    beside : path, folder of the page.
     """
     whole = {case.index: shape_of_ring(states) for case, states in zip(compared.cases, compared.states, strict=True)}
     answers = {number: ring_series(states) for number, states in whole.items()}

@@ -59,19 +59,12 @@ def ground_slips(scene):
 def quality(run, summary, scene=None):
     """Balances and limits that say how far the numbers can be trusted.
 
-    Parameters
-    ----------
-    run : xarray.DataTree
-    summary : dict
-        From :func:`coupling.postprocess.summary.summarise_run`.
-    scene : coupling.Scene or None
-        For the theory of the initial pressures.
+    run : xarray.DataTree;  summary : dict, from :func:`coupling.postprocess.summary.summarise_run`;
+    scene : coupling.Scene or None, for the theory of the initial pressures.
 
-    Returns
-    -------
-    list of (str, str, str, bool or None)
-        What, how much, and its verdict: a word of :data:`coupling.postprocess.quality.ERRORS`, or whether it is within
-        what is expected; None where nothing is expected of it.
+    Returns list of (str, str, str, bool or None): what, how much, and its verdict: a word of
+    :data:`coupling.postprocess.quality.ERRORS`, or whether it is within what is expected; None where nothing is
+    expected of it.
     """
     values = summary["quality"]
     rows = [(ERRORS[name].label, ERRORS[name].text(values[name]), verdict)

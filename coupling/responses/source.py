@@ -47,12 +47,8 @@ def read_source(path: str | Path, scene: str | None = None) -> Source:
 def read_sources(path: str | Path, scene: str | None = None) -> list[Source]:
     """Pressures and rings of all tunnels, that with the gate first, of a run, or of a file of another origin.
 
-    Parameters
-    ----------
-    path : str or path
-        A run's folder or file, or a netCDF-4 file with soil_pressure, water_pressure, soil_shear (time, theta) [Pa].
-    scene : str, optional
-        Scene whose rings are taken. Left out: the scene stored with the run, or the attribute `ring` (JSON of a
+    path : a run's folder or file, or a netCDF-4 file with soil_pressure, water_pressure, soil_shear (time, theta) [Pa];
+    scene : scene whose rings are taken. Left out: the scene stored with the run, or the attribute `ring` (JSON of a
         `structure.Ring`) of the file.
 
     Raises RunFileError: unreadable, not following the schema, or without a ring: which file, rule, value, remedy;

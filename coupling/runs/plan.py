@@ -25,24 +25,15 @@ def plan(
 ) -> dict[str, Any]:
     """Build the mesh and the points of a scene, take a few steps, and say what the run will cost.
 
-    Parameters
-    ----------
-    scene : coupling.Scene, str or path
-        As of :func:`coupling.run`.
-    threads : int or None
-    warn : callable or None
-        As of :func:`coupling.run`.
+    scene : as of :func:`coupling.run`;  warn : as of :func:`coupling.run`.
 
-    Returns
-    -------
-    dict
-        scene; features: list of {feature, active, reason}; initial_k0: see :func:`initial_k0`; elements, nodes, points;
-        min_altitude [m]; min_angle [degree]; dt [s]; dt_limit; stop_time [s] or None; stop_inflow_mass [kg/m] or None;
-        steps_to_stop_time (None without a stop time); expected_time [s] and expected_steps: rough where an inflow mass
-        stops the run; steps are those of the smallest elements, cut to the output interval; expected_point_steps:
-        updates of one point by one step; records; memory_bytes, free_memory_bytes; point_steps_per_second: measured
-        now; expected_seconds: of stepping, without mesh, relaxation and pictures. Steps are counted with the step of
-        the initial state; where ground flows it becomes up to a third shorter.
+    Returns: scene; features: list of {feature, active, reason}; initial_k0: see :func:`initial_k0`; elements, nodes,
+    points; min_altitude [m]; min_angle [degree]; dt [s]; dt_limit; stop_time [s] or None; stop_inflow_mass [kg/m] or
+    None; steps_to_stop_time (None without a stop time); expected_time [s] and expected_steps: rough where an inflow
+    mass stops the run; steps are those of the smallest elements, cut to the output interval; expected_point_steps:
+    updates of one point by one step; records; memory_bytes, free_memory_bytes; point_steps_per_second: measured now;
+    expected_seconds: of stepping, without mesh, relaxation and pictures. Steps are counted with the step of the initial
+    state; where ground flows it becomes up to a third shorter.
     """
     import mpm
 
@@ -141,12 +132,9 @@ def rough_plan(
 
     Parameters are those of :func:`plan`.
 
-    Returns
-    -------
-    dict
-        Keys of :func:`plan` that need no mesh: scene, features, initial_k0, elements, points, dt [s], stop_time [s],
-        stop_inflow_mass [kg/m], steps_to_stop_time, expected_time [s], expected_steps, records, memory_bytes,
-        free_memory_bytes. Elements, points and dt are right within a factor of three where the mesh is regular.
+    Returns: keys of :func:`plan` that need no mesh: scene, features, initial_k0, elements, points, dt [s], stop_time
+    [s], stop_inflow_mass [kg/m], steps_to_stop_time, expected_time [s], expected_steps, records, memory_bytes,
+    free_memory_bytes. Elements, points and dt are right within a factor of three where the mesh is regular.
 
     Raises coupling.refused.Refused: too little memory.
     """

@@ -47,10 +47,7 @@ class RecordedSimulation:
 
         Whatever stops it, what was computed stays readable and the run can be continued.
 
-        Raises
-        ------
-        RunFailed, KeyboardInterrupt, OSError, MemoryError
-            With a note that says how to go on.
+        Raises RunFailed, KeyboardInterrupt, OSError, MemoryError: with a note that says how to go on.
         """
         import mpm
 

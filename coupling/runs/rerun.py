@@ -30,10 +30,7 @@ def rerun(
     Further arguments are those of :func:`coupling.run`; `out` is ``runs/<scene>-rerun``, numbered, when None. `warn` is
     also told what differs between then and now that the bits may depend on.
 
-    Returns
-    -------
-    dict
-        run, rerun (folders), changed (name to [then, now]), and the keys of :func:`compare_bits`.
+    Returns: run, rerun (folders), changed (name to [then, now]), and the keys of :func:`compare_bits`.
 
     Raises Refused, mpm.RunFailed, KeyboardInterrupt, OSError: as :func:`coupling.run`; and a run without a record.
     """
@@ -53,12 +50,9 @@ def rerun(
 def compare_bits(first: str | Path, second: str | Path) -> dict[str, Any]:
     """Compare mesh, pressures, history and points of two runs over the records that both have.
 
-    Returns
-    -------
-    dict
-        identical : bool; records : int, how many were compared; records_run, records_rerun : int;
-        differences : list of {variable, time [s] of the first record that differs or None, largest: largest absolute
-        difference or None}.
+    Returns: identical : bool; records : int, how many were compared; records_run, records_rerun : int;
+    differences : list of {variable, time [s] of the first record that differs or None, largest: largest absolute
+    difference or None}.
     """
     one, other = raw_groups(first), raw_groups(second)
     found = []

@@ -109,11 +109,8 @@ def _from_to(values):
 def initial_k0(scene: MpmScene) -> list[dict[str, Any]]:
     """The K0 that each soil begins with.
 
-    Returns
-    -------
-    list of dict
-        soil: its name; lowest, highest: K0 within the layer [-]; source: "given", "gravity loading" or "yield surface",
-        where gravity loading is brought to the strength of the soil; yield_depth: from where on [m], else None.
+    Returns: soil: its name; lowest, highest: K0 within the layer [-]; source: "given", "gravity loading" or "yield
+    surface", where gravity loading is brought to the strength of the soil; yield_depth: from where on [m], else None.
     """
     rows = []
     for soil in scene.soils:

@@ -54,12 +54,7 @@ def _source(path: tuple[Any, ...], layers: tuple[Layer, ...]) -> tuple[Layer | N
 def line_of(text: str, path: tuple[Any, ...]) -> int | None:
     """Number of the line, from 1, on which the statement with a key begins; None where the text has no such key.
 
-    Parameters
-    ----------
-    text : str
-        Valid TOML.
-    path : tuple of str and int
-        Keys of tables and indices of lists, as ("soils", 0, "porosity").
+    text : valid TOML;  path : tuple of str and int, keys of tables and indices of lists, as ("soils", 0, "porosity").
     """
     lines = text.split("\n")
 
@@ -101,14 +96,8 @@ def holds(data, path):
 def path_of(message, location, data):
     """The key that a message is about: its location, and names of tables and keys that the message mentions.
 
-    Parameters
-    ----------
-    message : str
-        As "soil 'sand': porosity must ..", "tunnel 0: ..", "gate: width ..".
-    location : tuple of str and int
-        Of the table whose check failed; empty for the whole scene.
-    data : dict
-        The scene.
+    message : str, as "soil 'sand': porosity must ..", "tunnel 0: ..", "gate: width ..";  location : tuple of str and
+    int, of the table whose check failed; empty for the whole scene;  data : dict, the scene.
     """
     path = tuple(location)
     table = entry_at(data, path)

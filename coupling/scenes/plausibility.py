@@ -123,10 +123,7 @@ def _other_rings(scene):
 def hints(data: dict[str, Any]) -> dict[tuple[Any, ...], str]:
     """Unusual numbers of a scene's nested dictionary, validated or not.
 
-    Returns
-    -------
-    dict of tuple to str
-        Path of the key to what to think of.
+    Returns: path of the key to what to think of.
     """
     found = {}
     for name, usual in USUAL.items():

@@ -14,18 +14,11 @@ PROGRESS = ("time", "flow_zone_area", "disturbed_area", "suspended_fraction", "m
 def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, threads: int = 1) -> str:
     """Run one scene and write its `case.nc`, at once where that exists; returns the path of the file.
 
-    Parameters
-    ----------
-    source : str
-        TOML of the complete scene.
-    folder : str
-        The case's own; made when absent. What a killed run left there is continued where it can be.
-    backends : tuple of str
-        Lining models.
-    records : int
-        Number of inflow masses.
-    threads : int
-        Results do not depend on it.
+    source : TOML of the complete scene;
+    folder : the case's own; made when absent. What a killed run left there is continued where it can be;
+    backends : tuple of str, lining models;
+    records : number of inflow masses;
+    threads : results do not depend on it.
 
     Raises mpm.RunFailed, structure.LiningFailure, coupling.refused.Refused: as :func:`coupling.run`; the study goes on
     without the case.
@@ -77,24 +70,16 @@ def run_case(source: str, folder: str, backends: tuple[str, ...], records: int, 
 def at_inflow_masses(pressures, history, responses, masses, along="inflow_mass"):
     """States of a run at fixed inflow masses, or times; NaN beyond what the run reached.
 
-    Parameters
-    ----------
-    pressures, history : xarray.Dataset
-        Of the run, one tunnel.
-    responses : dict of str to xarray.Dataset
-        By lining model.
-    masses : (n,) float64
-        [kg/m], ascending from 0, the initial state; along "time" [s].
-    along : {"inflow_mass", "time"}
+    pressures, history : xarray.Dataset, of the run, one tunnel;
+    responses : dict of str to xarray.Dataset, by lining model;
+    masses : (n,) float64 [kg/m], ascending from 0, the initial state; along "time" [s];
+    along : {"inflow_mass", "time"}.
 
-    Returns
-    -------
-    xarray.Dataset
-        Pressures (progress, theta); time, zones and so on (progress); variables of the responses with a dimension
-        `model`; of checks (model) NAME_largest [-] over all records and NAME_passing_mass, the inflow mass [kg/m] at
-        which it first passes 1, NaN for never, NAME of :data:`structure.limits.UTILISATIONS`; `inflow_mass`
-        (progress) [kg/m]; progress from 0 to 1 is the share of the last inflow mass, so that cases of different stops
-        stack. cpu_seconds, quality numbers as scalars.
+    Returns xarray.Dataset: pressures (progress, theta); time, zones and so on (progress); variables of the responses
+    with a dimension `model`; of checks (model) NAME_largest [-] over all records and NAME_passing_mass, the inflow mass
+    [kg/m] at which it first passes 1, NaN for never, NAME of :data:`structure.limits.UTILISATIONS`; `inflow_mass`
+    (progress) [kg/m]; progress from 0 to 1 is the share of the last inflow mass, so that cases of different stops
+    stack. cpu_seconds, quality numbers as scalars.
     """
     import xarray as xr
 

@@ -22,13 +22,10 @@ MOST_BYTES_IN_MEMORY = 5e8
 def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, str]) -> xr.Dataset:
     """The cases' datasets along a dimension `case`; a large study is loaded when used.
 
-    Returns
-    -------
-    xarray.Dataset
-        Variables of :func:`coupling.studies.case.at_inflow_masses` with `case` in front, NaN in failed cases;
-        parameters as coordinates (case) in SI under their dotted names with `_` for `.`, and `case_name`; `status`
-        (case) "finished" or "failed", `message` (case). Attributes: `study`, its definition as JSON with the seed;
-        `failed`, their number; source, revision, versions.
+    Returns: variables of :func:`coupling.studies.case.at_inflow_masses` with `case` in front, NaN in failed cases;
+    parameters as coordinates (case) in SI under their dotted names with `_` for `.`, and `case_name`; `status` (case)
+    "finished" or "failed", `message` (case). Attributes: `study`, its definition as JSON with the seed; `failed`, their
+    number; source, revision, versions.
 
     Raises coupling.studies.design.StudyError: the file of a case is damaged.
     """

@@ -12,18 +12,11 @@ from structure.limits import UTILISATIONS
 def limits_of_case(case: xr.Dataset, model: str | None) -> dict[str, dict[str, float | None]]:
     """Utilisations of one case of a study by one lining model.
 
-    Parameters
-    ----------
-    case : xarray.Dataset
-        Of :func:`coupling.studies.case.at_inflow_masses`.
-    model : str or None
-        None: the study has no lining model.
+    case : of :func:`coupling.studies.case.at_inflow_masses`;  model : None: the study has no lining model.
 
-    Returns
-    -------
-    dict
-        Name of :data:`structure.limits.UTILISATIONS` to: largest [-], infinite where nothing is carried; passing_mass:
-        inflow mass [kg/m] at which it first passes 1, None for never. Empty for a case without limits or result.
+    Returns: name of :data:`structure.limits.UTILISATIONS` to: largest [-], infinite where nothing is carried;
+    passing_mass: inflow mass [kg/m] at which it first passes 1, None for never. Empty for a case without limits or
+    result.
     """
     found: dict[str, dict[str, float | None]] = {}
     answered = model is not None and "model" in case.dims and model in case["model"].values
@@ -38,17 +31,11 @@ def limits_of_case(case: xr.Dataset, model: str | None) -> dict[str, dict[str, f
 def limits_of_study(cases: dict[int, dict[str, dict[str, float | None]]]) -> dict[str, dict[str, Any]]:
     """The worst case and the share of cases beyond every limit.
 
-    Parameters
-    ----------
-    cases : dict
-        Number of a finished case to what :func:`limits_of_case` says of it.
+    cases : number of a finished case to what :func:`limits_of_case` says of it.
 
-    Returns
-    -------
-    dict
-        Name of :data:`structure.limits.UTILISATIONS` to: cases, how many are held against it; beyond, how many of them
-        pass 1; share [-] of these; worst_case, its number; largest [-], its utilisation; least_passing_mass, the least
-        inflow mass [kg/m] at which a case passes 1, None for none.
+    Returns: name of :data:`structure.limits.UTILISATIONS` to: cases, how many are held against it; beyond, how many of
+    them pass 1; share [-] of these; worst_case, its number; largest [-], its utilisation; least_passing_mass, the least
+    inflow mass [kg/m] at which a case passes 1, None for none.
     """
     found = {}
     for name in UTILISATIONS:

@@ -15,14 +15,11 @@ RESULTS = ("cpu_seconds", "inflow_mass", "time", "axial_force", "bending_moment"
 def run_study(name, out, workers, scheduler, console):
     """Run a study, store its dataset as study.nc, and return what the command shows.
 
-    Returns
-    -------
-    dict
-        study, folder, data: path of the dataset; model: the first lining model; cases: list of dicts with case, name,
-        parameters, status, message, cpu_seconds [s], and at the last inflow mass reached: inflow_mass [kg/m], time [s],
-        axial_force [N/m] and bending_moment [N m/m] of that model as {max, min}, None without a ring; utilisations of
-        that model over the whole case, as :func:`coupling.studies.limits.limits_of_case`; limits: as
-        :func:`coupling.studies.limits.limits_of_study`.
+    Returns a dict: study, folder, data: path of the dataset; model: the first lining model; cases: list of dicts with
+    case, name, parameters, status, message, cpu_seconds [s], and at the last inflow mass reached: inflow_mass [kg/m],
+    time [s], axial_force [N/m] and bending_moment [N m/m] of that model as {max, min}, None without a ring;
+    utilisations of that model over the whole case, as :func:`coupling.studies.limits.limits_of_case`; limits: as
+    :func:`coupling.studies.limits.limits_of_study`.
     """
     from coupling.datasets import write_dataset
     from coupling.studies.cases import cases

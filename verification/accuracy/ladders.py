@@ -25,11 +25,8 @@ def measure(problem: Problem, only_fast: bool = False, progress: Callable[[str],
 
     The fast setting runs twice and the second counts: compiling is no cost of a method.
 
-    Returns
-    -------
-    list of dict
-        problem, setting ("default" for the fast setting), value, error [-], cpu_seconds [s], steps, points,
-        values (further numbers, SI). A run that fails has error NaN and `failure`, its message.
+    Returns: problem, setting ("default" for the fast setting), value, error [-], cpu_seconds [s], steps, points, values
+    (further numbers, SI). A run that fails has error NaN and `failure`, its message.
     """
     tell = progress if progress is not None else lambda line: None
     problem.solve(**problem.fast)
@@ -62,12 +59,9 @@ def _line(row):
 def assess(rows: Iterable[dict]) -> dict:
     """Orders of the ladders of one problem, its Pareto front, and where the default lies.
 
-    Returns
-    -------
-    dict
-        orders : setting that is a mesh size, a time step or a count to the observed order;  front : (n_rows,) bool,
-        among numerical choices only: another friction angle is another problem, not a cheaper method;  excess : error
-        of the default over the best error of what costs no more, 1 where it is round-off.
+    Returns: orders : setting that is a mesh size, a time step or a count to the observed order;  front : (n_rows,)
+    bool, among numerical choices only: another friction angle is another problem, not a cheaper method;  excess : error
+    of the default over the best error of what costs no more, 1 where it is round-off.
     """
     rows = list(rows)
     physical = physical_settings()
@@ -100,10 +94,8 @@ def physical_settings() -> set[str]:
 def dataset(rows: Iterable[dict]):
     """All runs of all problems as a dataset over `run`.
 
-    Returns
-    -------
-    xarray.Dataset
-        problem, setting, value (as text), error [-], cpu_seconds [s], steps, points, on_front (run).
+    Returns xarray.Dataset: problem, setting, value (as text), error [-], cpu_seconds [s], steps, points, on_front
+    (run).
     """
     import numpy as np
     import xarray as xr

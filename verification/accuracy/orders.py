@@ -21,10 +21,7 @@ class Extrapolation(NamedTuple):
 def observed_order(size: np.ndarray, error: np.ndarray) -> float:
     """Slope of log error over log size, least squares; NaN with fewer than two positive errors or one size only.
 
-    Parameters
-    ----------
-    size, error : (n,) float64
-        Mesh size or time step, and errors.
+    size, error : (n,) float64, mesh size or time step, and errors.
     """
     size, error = np.asarray(size, float), np.asarray(error, float)
     known = np.isfinite(error) & (error > 0) & (size > 0)
@@ -57,15 +54,9 @@ def extrapolate(size: np.ndarray, value: np.ndarray, order: float = 1.0) -> Extr
     Fits value = f0 + C size^order by least squares. The order is given, not fitted: three or four sizes with
     scatter do not determine it (Roache 1998 asks for the asymptotic range, where the order is known).
 
-    Parameters
-    ----------
-    size, value : (n,) float64
-        n at least 3, at least two different sizes.
+    size, value : (n,) float64, n at least 3, at least two different sizes.
 
-    Raises
-    ------
-    ValueError
-        Too few values.
+    Raises ValueError: too few values.
     """
     size, value = np.asarray(size, float), np.asarray(value, float)
     if len(size) < 3 or np.ptp(size) == 0:

@@ -14,16 +14,10 @@ BLOCKS = ("made", "overview", "problems")
 def problem_ladders(names, only_fast, out, tell):
     """Measure verification problems (all without names) and write accuracy.md, accuracy.nc and images/ into a folder.
 
-    Returns
-    -------
-    dict
-        page, data : paths as text;  problems : name to default error, its limit, within (bool), cpu_seconds, orders,
-        excess (see :func:`verification.accuracy.ladders.assess`).
+    Returns a dict: page, data : paths as text;  problems : name to default error, its limit, within (bool),
+    cpu_seconds, orders, excess (see :func:`verification.accuracy.ladders.assess`).
 
-    Raises
-    ------
-    coupling.refused.Refused
-        Unknown problem.
+    Raises coupling.refused.Refused: unknown problem.
     """
     from verification.problems import problems
 

@@ -48,10 +48,7 @@ def stress_rate(strain_rate, active, elastic, normals, flows):
     Koiter (1953): sigma' = D (eps' - sum lambda_i m_i), lambda_i >= 0, n_i sigma' <= 0, one of both zero; the first
     set of at most three planes that fulfils it, the smallest first.
 
-    Raises
-    ------
-    ArithmeticError
-        Where no set does: the flow rule has no answer to this strain rate.
+    Raises ArithmeticError: where no set does: the flow rule has no answer to this strain rate.
     """
     free = elastic @ strain_rate
     scale = np.abs(free).max()
@@ -75,14 +72,8 @@ def stress_rate(strain_rate, active, elastic, normals, flows):
 def exact_path(stress, strain_rates, times, elastic, planes):
     """Stresses at the end of each straight piece of a strain path: (n_pieces, 3) [Pa].
 
-    Parameters
-    ----------
-    stress : (3,) float64
-        Admissible at the start [Pa], tension positive.
-    strain_rates : (n_pieces, 3) float64
-        [1/s];  times : (n_pieces,) durations [s].
-    elastic : (3, 3) float64
-    planes : of `yield_planes`
+    stress : (3,) float64, admissible at the start [Pa], tension positive;  strain_rates : (n_pieces, 3) float64 [1/s];
+    times : (n_pieces,) durations [s];  elastic : (3, 3) float64;  planes : of `yield_planes`.
     """
     normals, flows, offsets = planes
     stress = np.array(stress, float)

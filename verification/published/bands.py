@@ -32,18 +32,8 @@ def judged(
 ) -> Verdict:
     """Band and verdict of one statement.
 
-    Parameters
-    ----------
-    statement, found
-        What is stated, and ours.
-    meshes : dict
-        Size of the mesh over that of the scene to ours on it; fewer than two others than the scene's give no error.
-    unknowns : dict
-        Name to pairs of (changed, unchanged), computed alike.
-
-    Returns
-    -------
-    Verdict
+    statement, found : what is stated, and ours;  meshes : size of the mesh over that of the scene to ours on it; fewer
+    than two others than the scene's give no error;  unknowns : name to pairs of (changed, unchanged), computed alike.
     """
     log = statement.factor
     ours = _of(found.value, log)

@@ -27,16 +27,9 @@ CAPTIONS = {
 def draw_case(case, folder: str | Path) -> dict[str, Path]:
     """Figures 9 to 17 of one run.
 
-    Parameters
-    ----------
-    case : verification.published.evidence.RunEvidence
-    folder : str or path
-        Made when absent.
+    case : verification.published.evidence.RunEvidence;  folder : made when absent.
 
-    Returns
-    -------
-    dict of str to Path
-        Number of the published figure to file.
+    Returns: number of the published figure to file.
     """
     response, pressures, masses = case.responses["beam-spring"], case.of_gate, case.masses
     fields = postprocess.with_inflow(postprocess.element_fields(case.points, case.mesh), case.history)
@@ -126,10 +119,7 @@ def _saved(folder, figures):
 def draw_study(study: str | Path, folder: str | Path) -> dict[str, Path]:
     """Draw what the finished cases of a study allow: twin tunnels, case 3, and all scenes beside each other.
 
-    Raises
-    ------
-    coupling.studies.design.StudyError
-        No study there, or none of those scenes in it is finished.
+    Raises coupling.studies.design.StudyError: no study there, or none of those scenes in it is finished.
     """
     from coupling.studies.collect import stored_cases
     from coupling.studies.design import StudyError

@@ -159,10 +159,7 @@ class RunEvidence:
 def at_rest(scene, file: str | Path):
     """Pressures on all linings in the bonded initial state, computed once and kept in a file.
 
-    Returns
-    -------
-    xarray.Dataset
-        soil_pressure, water_pressure, soil_shear (time, [tunnel,] theta) [Pa], one time.
+    Returns xarray.Dataset: soil_pressure, water_pressure, soil_shear (time, [tunnel,] theta) [Pa], one time.
     """
     import xarray as xr
 
@@ -193,10 +190,7 @@ def at_rest(scene, file: str | Path):
 def initial_theory(scene, tunnel):
     """Soil and water pressure that theory expects on an undisturbed circle in the scene's ground.
 
-    Returns
-    -------
-    xarray.Dataset
-        soil_pressure sigma_v cos^2 + K0 sigma_v sin^2, water_pressure (theta) [Pa].
+    Returns xarray.Dataset: soil_pressure sigma_v cos^2 + K0 sigma_v sin^2, water_pressure (theta) [Pa].
     """
     import xarray as xr
 

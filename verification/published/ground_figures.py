@@ -74,13 +74,8 @@ def inflow_and_stages(history):
 def fields_around(fields, mesh, mass):
     """Displacement with the edges of both zones, deviatoric strain, pore pressure, vertical stress at an inflow mass.
 
-    Parameters
-    ----------
-    fields : xarray.Dataset
-        Of :func:`coupling.postprocess.element_fields`, with inflow_mass (time).
-    mesh : xarray.Dataset
-    mass : float
-        [kg/m]
+    fields : xarray.Dataset, of :func:`coupling.postprocess.element_fields`, with inflow_mass (time);
+    mesh : xarray.Dataset;  mass : float [kg/m].
     """
     now = postprocess.at_inflow(fields, mass)
     panels = (
@@ -151,12 +146,8 @@ def _draw_field(axis, mesh, values, colours, norm):
 def stresses_along_axes(horizontal, vertical, masses):
     """Soil stress across, and pore pressure along, both axes through the gate at some inflow masses.
 
-    Parameters
-    ----------
-    horizontal, vertical : xarray.Dataset
-        Of :func:`coupling.postprocess.profile`, with inflow_mass (time).
-    masses : sequence of float
-        [kg/m]
+    horizontal, vertical : xarray.Dataset, of :func:`coupling.postprocess.profile`, with inflow_mass (time);
+    masses : sequence of float [kg/m].
     """
     panels = (
         (horizontal, "soil_stress_vertical", "vertical effective stress [kPa]"),

@@ -20,18 +20,12 @@ JOINTS = {
 def rings(panels, columns, gate=None, joints=(), heads=()):
     """Polar diagrams beside and below each other, the crown up.
 
-    Parameters
-    ----------
-    panels : list of (title, curves)
-        Curves: list of (label, (n,) values at whole degrees, keys of a line).
-    columns : int
-        Panels beside each other; every column has the legend of its lowest panel below it, or all the same one.
-    gate : float, optional
-        Angle of a red mark on the rim [degree].
-    joints : sequence of float
-        Angles of grey marks [degree].
-    heads : sequence of str
-        Titles of the columns; those of the panels then stand beside the rows.
+    panels : list of (title, curves), curves: list of (label, (n,) values at whole degrees, keys of a line);
+    columns : int, panels beside each other; every column has the legend of its lowest panel below it, or all the same
+        one;
+    gate : float, optional, angle of a red mark on the rim [degree];
+    joints : sequence of float, angles of grey marks [degree];
+    heads : sequence of str, titles of the columns; those of the panels then stand beside the rows.
     """
     count = -(-len(panels) // columns)
     with matplotlib.rc_context(STYLE):

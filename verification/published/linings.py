@@ -9,12 +9,7 @@ def one_layer(size: float, outer: float, inner: float, poissons_ratio: float, ha
     A radial traction cos(harmonic theta) on the outer face; stiffness is the inverse of the work it does. Linear
     triangles have constant strain, so a layer that bends shears and stretches as a whole.
 
-    Parameters
-    ----------
-    size : float
-        Length of the triangles along the ring [m].
-    outer, inner : float
-        Radii [m].
+    size : length of the triangles along the ring [m];  outer, inner : radii [m].
     """
     import skfem
 

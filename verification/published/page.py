@@ -32,23 +32,13 @@ LININGS = {**{f"M{k}": f"M joint {k}" for k in range(1, 7)}, "M invert": "M inve
 def write_page(folder: str | Path, out: str | Path) -> dict:
     """Draw the figures of what `gush published` has finished, and write published.md.
 
-    Parameters
-    ----------
-    folder : str or path
-        With the studies of :func:`verification.published.runs.plans`; what is absent is left out and named.
-    out : str or path
-        Folder of published.md and its images/published/.
+    folder : with the studies of :func:`verification.published.runs.plans`; what is absent is left out and named;
+    out : folder of published.md and its images/published/.
 
-    Returns
-    -------
-    dict
-        page: path; figures: number to path; answers: list of {statement, published, ours, low, high, agrees, rule};
-        missing: list.
+    Returns: page: path; figures: number to path; answers: list of {statement, published, ours, low, high, agrees,
+    rule}; missing: list.
 
-    Raises
-    ------
-    coupling.refused.SceneError
-        Case 3 is not there.
+    Raises coupling.refused.SceneError: case 3 is not there.
     """
     folder, out = Path(folder), Path(out)
     runs = {run.evidence.scene.name: run.evidence for run in finished(folder / "cases")}

@@ -12,16 +12,11 @@ SLOT = 1.03
 def independent_rates(scene) -> dict[str, float]:
     """Rates through the gate of a scene as if it were something simpler [kg/m/s].
 
-    Parameters
-    ----------
-    scene : coupling.Scene
+    scene : coupling.Scene.
 
-    Returns
-    -------
-    dict
-        heavy liquid: grains of a saturated ground without strength under its own weight, out of an orifice;
-        water: water out of the same orifice;  dry hopper: grains of dry sand out of a silo with this slot in its floor;
-        seepage: water that seeps through ground at rest, see `verification.sensitivity.inflow.seepage`.
+    Returns: heavy liquid: grains of a saturated ground without strength under its own weight, out of an orifice; water:
+    water out of the same orifice;  dry hopper: grains of dry sand out of a silo with this slot in its floor; seepage:
+    water that seeps through ground at rest, see `verification.sensitivity.inflow.seepage`.
     """
     from verification.sensitivity.inflow import seepage
 

@@ -35,11 +35,8 @@ def plans(quick: bool = False) -> list[dict]:
     All cases are on the meshes of their scenes, case 3 also on two others, case 5 and the twin tunnels on one; unknowns
     are varied on a mesh :data:`COARSEST` times as coarse.
 
-    Parameters
-    ----------
-    quick : bool
-        A look: case 3 on a mesh :data:`COARSE` times as coarse, all the rest on one that is :data:`COARSEST`; one
-        lining model.
+    quick : a look: case 3 on a mesh :data:`COARSE` times as coarse, all the rest on one that is :data:`COARSEST`; one
+    lining model.
     """
     whole, part = {"inflow_mass": LAST, "time": 20.0}, {"inflow_mass": COMPARED, "time": 10.0}
     scenes = ["case-3", "twin-tunnels", *(f"case-{k}" for k in (1, 2, 4, 5, 6, 7, 8, 9, 10))]
@@ -73,10 +70,7 @@ def plans(quick: bool = False) -> list[dict]:
 def run_all(out: str | Path, quick=False, workers=None, scheduler=None, console=None) -> list[dict]:
     """Run all studies into folders of their names; what is there already is not run again.
 
-    Returns
-    -------
-    list of dict
-        Of :func:`coupling.studies.stored.run_study`, one a study.
+    Returns: of :func:`coupling.studies.stored.run_study`, one a study.
     """
     from rich.console import Console
 

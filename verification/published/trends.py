@@ -23,10 +23,7 @@ class Trend(NamedTuple):
 def trends(cases) -> list[Trend]:
     """Answers to section 5 of the source; those whose cases are not there are left out.
 
-    Parameters
-    ----------
-    cases : dict of str to RunEvidence
-        By scene; one that did not get to 1000 kg/m speaks of where it ended.
+    cases : dict of str to RunEvidence, by scene; one that did not get to 1000 kg/m speaks of where it ended.
     """
     return [trend(cases) for needs, trend in (
         (RING[:2], _upper_gates), (RING[2:3], _invert), (RING, _gate_below), (DEPTHS, _depths),

@@ -32,10 +32,7 @@ class CaseRun(NamedTuple):
 def finished(folder: str | Path) -> list[CaseRun]:
     """Finished cases of a study, in its order; none where there is no study.
 
-    Raises
-    ------
-    coupling.studies.design.StudyError
-        A study that is damaged.
+    Raises coupling.studies.design.StudyError: a study that is damaged.
     """
     from coupling.studies.collect import stored_cases
     from coupling.studies.design import STUDY_FILE

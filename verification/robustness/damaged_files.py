@@ -98,25 +98,15 @@ TEXT = re.compile(r"@|^info$")
 def judged(path, kind, whole, before_change=None):
     """What becomes of a damaged file.
 
-    Parameters
-    ----------
-    path : path
-    kind : str
-        Of `READERS`.
-    whole : dict
-        What the reader gives for the undamaged file.
-    before_change : dict or None
-        What it gives without the journal: an incomplete one belongs to a change that never began.
+    path : path;
+    kind : str, of `READERS`;
+    whole : dict, what the reader gives for the undamaged file;
+    before_change : dict or None, what it gives without the journal: an incomplete one belongs to a change that never
+        began.
 
-    Returns
-    -------
-    str
-        "refused"; "same content"; "content before the change"; "another text" (it
-        differs, and is valid).
+    Returns str: "refused"; "same content"; "content before the change"; "another text" (it differs, and is valid).
 
-    Raises
-    ------
-    AssertionError
+    Raises AssertionError.
     """
     reader, guarded = READERS[kind]
     before = path.read_bytes()

@@ -34,11 +34,8 @@ def wild_pressures(random):
 
     random : random.Random.
 
-    Returns
-    -------
-    xarray.Dataset, xarray.Dataset, str
-        As it is written; in Pa, s and degrees ascending in [0, 360) as the generator knows them; the kind of its
-        mistake, "right" without one.
+    Returns xarray.Dataset, xarray.Dataset, str: as it is written; in Pa, s and degrees ascending in [0, 360) as the
+    generator knows them; the kind of its mistake, "right" without one.
     """
     draw, kind = np.random.default_rng(random.getrandbits(64)), random.choice(KINDS)
     count, records = random.choice((8, 9, 12, 36, 72, 360)), random.choice((1, 2, 5))
@@ -165,9 +162,7 @@ def judged(path, true, kind):
 
     "untold": taken as it is written, and nobody can know better (`ANGLES_THAT_TELL`).
 
-    Raises
-    ------
-    AssertionError, or whatever the program should not have raised.
+    Raises AssertionError, or whatever the program should not have raised.
     """
     from coupling.datasets import RunFileError
     from coupling.responses.source import read_source

@@ -123,23 +123,12 @@ def _torn(random, text):
 def judged(load, origin, in_file):
     """What becomes of a scene: "planned", "warned" or "refused", else a fault.
 
-    Parameters
-    ----------
-    load : callable
-        Returns the scene.
-    origin : str
-        What a refusal must name.
-    in_file : bool
-        Whether a refusal must tell lines.
+    load : callable, returns the scene;  origin : str, what a refusal must name;  in_file : bool, whether a refusal must
+    tell lines.
 
-    Returns
-    -------
-    str, str
-        Verdict, and what was said.
+    Returns str, str: verdict, and what was said.
 
-    Raises
-    ------
-    AssertionError, or whatever the program should not have raised.
+    Raises AssertionError, or whatever the program should not have raised.
     """
     begin = time.monotonic()
     try:

@@ -37,11 +37,8 @@ def scene_ladder(name, inflow_mass, out, tell, factors=FACTORS):
 def ladder_dataset(factor, found):
     """All quantities on all meshes, and their extrapolations.
 
-    Returns
-    -------
-    xarray.Dataset
-        value (mesh, inflow_mass, quantity), extrapolated, error_bar, scatter (inflow_mass, quantity) in the unit that
-        the name of the quantity ends with; factor (mesh).
+    Returns xarray.Dataset: value (mesh, inflow_mass, quantity), extrapolated, error_bar, scatter (inflow_mass,
+    quantity) in the unit that the name of the quantity ends with; factor (mesh).
     """
     fits = [at_size_zero(factor, state) for state in found.values()]
     names = [name if not name.startswith("time") else "time [s]" for name in next(iter(found.values()))]
@@ -62,17 +59,10 @@ def ladder_dataset(factor, found):
 def write_ladder(name, factor, found, cpu_seconds, folder):
     """Write NAME-ladder.md, .nc and pictures into a folder.
 
-    Parameters
-    ----------
-    factor, cpu_seconds : (n_meshes,) float64
-        Mesh size over the scene's; processor time [s].
-    found : dict
-        Inflow mass [kg/m] to :func:`verification.sensitivity.variants.quantities`.
+    factor, cpu_seconds : (n_meshes,) float64, mesh size over the scene's; processor time [s];  found : dict, inflow
+    mass [kg/m] to :func:`verification.sensitivity.variants.quantities`.
 
-    Returns
-    -------
-    dict
-        page, data : paths as text.
+    Returns a dict: page, data : paths as text.
     """
     ladder, own = ladder_dataset(factor, found), abs(factor - 1).argmin()
     lines = [

@@ -36,18 +36,12 @@ def value_at(scene, name):
 def run_variants(name, variants, inflow_mass, folder, workers=None, tell=None, **fixed):
     """Run variants of a scene to an inflow mass [kg/m]; those that are in the folder already are not run again.
 
-    Parameters
-    ----------
-    name : str
-        Built-in scene or TOML file; needs a gate and a ring.
-    variants : dict
-        What is varied, in words, to dotted names with their values; what others change stays as in the scene.
+    name : str, built-in scene or TOML file; needs a gate and a ring;
+    variants : dict, what is varied, in words, to dotted names with their values; what others change stays as in the
+        scene;
     fixed : dotted names with the values that all variants have.
 
-    Returns
-    -------
-    xarray.Dataset
-        Of :func:`coupling.study`, `case_name` being what is varied.
+    Returns xarray.Dataset: of :func:`coupling.study`, `case_name` being what is varied.
     """
     scene = coupling.load_scene(name)
     if scene.gate is None or scene.ring is None:
@@ -67,12 +61,9 @@ def run_variants(name, variants, inflow_mass, folder, workers=None, tell=None, *
 def quantities(data, inflow_mass, gate=90.0):
     """What people read off a run, at an inflow mass [kg/m], of every case; 0 is the initial state.
 
-    Returns
-    -------
-    dict
-        Name with unit to (n_cases,) float64: time; mean pressures over arcs and those 10 degrees beside the gate;
-        extreme forces; rotation and opening of joints 2 and 3; roughness and noise of the soil pressure: its root mean
-        square off the mean and off the parabola over `HALF_ARC` each side, beyond `BESIDE_GATE` from the gate.
+    Returns a dict: name with unit to (n_cases,) float64: time; mean pressures over arcs and those 10 degrees beside the
+    gate; extreme forces; rotation and opening of joints 2 and 3; roughness and noise of the soil pressure: its root
+    mean square off the mean and off the parabola over `HALF_ARC` each side, beyond `BESIDE_GATE` from the gate.
     """
     mass = data["inflow_mass"].max("case").values  # the same of all cases
     at = int(np.abs(mass - inflow_mass).argmin())

@@ -29,28 +29,19 @@ FEW_SECONDS = 0.3
 def bench(scene, step_only=False, large=False, tell=lambda line: None, rounds=ROUNDS, seconds=SECONDS):
     """Measure what steps, sizes, starts and parallel runs cost.
 
-    Parameters
-    ----------
-    scene : coupling.Scene
-        Gate open, from the geostatic state.
-    step_only : bool
-        Only the step of the whole scene beside the reference loop and the copy.
-    large : bool
-        Also three million points.
-    tell : callable
-        Called with a line of text now and then.
-    rounds, seconds : int, float
-        The best of some rounds counts, each of so much processor time: other programs only ever slow one down.
+    scene : coupling.Scene, gate open, from the geostatic state;
+    step_only : bool, only the step of the whole scene beside the reference loop and the copy;
+    large : bool, also three million points;
+    tell : callable, called with a line of text now and then;
+    rounds, seconds : int, float, the best of some rounds counts, each of so much processor time: other programs only
+        ever slow one down.
 
-    Returns
-    -------
-    dict
-        step_points_per_second, reference_points_per_second: point-steps per second of processor time, one thread;
-        step_to_reference_ratio; scene, points, elements, step_rounds, reference_rounds: all measurements;
-        copy_bytes_per_second; bytes_per_point: memory of the solver; bytes_per_point_step: as counted;
-        roofline_points_per_second: copy over bytes; kernels: name to processor seconds per point-step; load: mean
-        number of running programs before and after. Unless `step_only` also configurations, threads, sizes,
-        size_slope, imports [s], start [s], first_step_wall_seconds, throughput, study (`studies.study_seconds`).
+    Returns a dict: step_points_per_second, reference_points_per_second: point-steps per second of processor time, one
+    thread; step_to_reference_ratio; scene, points, elements, step_rounds, reference_rounds: all measurements;
+    copy_bytes_per_second; bytes_per_point: memory of the solver; bytes_per_point_step: as counted;
+    roofline_points_per_second: copy over bytes; kernels: name to processor seconds per point-step; load: mean number of
+    running programs before and after. Unless `step_only` also configurations, threads, sizes, size_slope, imports [s],
+    start [s], first_step_wall_seconds, throughput, study (`studies.study_seconds`).
     """
     import mpm
 

@@ -100,12 +100,8 @@ def first_step_wall_seconds():
 def throughput(count, seconds=4.0):
     """Point-steps per wall second of `count` independent runs at once, one thread each.
 
-    Returns
-    -------
-    total : float
-        Summed over the processes.
-    share : float
-        Processor time over wall time of a process; below 1 the machine was busy with something else.
+    Returns total : float, summed over the processes;  share : float, processor time over wall time of a process; below
+    1 the machine was busy with something else.
     """
     processes = [_python(EVENT, str(seconds)) for _ in range(count)]
     for process in processes:

@@ -56,12 +56,10 @@ WAYS = {"loop, all cores": (LOOP, "0"), "loop, one thread": (LOOP, "1"), "study,
 def study_seconds(rounds=3, tell=lambda line: None):
     """What each of `WAYS` takes.
 
-    Returns
-    -------
-    dict
-        rounds, best: name to wall and processor time [s]; path: processor time of the study before its workers start,
-        while they load, of a half of their cases, and after the last one [s]; share_of_loop: of the wall time of the
-        faster loop; share_on_idle_cores: of path over the processor time of the loop of one thread; load, provenance.
+    Returns a dict: rounds, best: name to wall and processor time [s]; path: processor time of the study before its
+    workers start, while they load, of a half of their cases, and after the last one [s]; share_of_loop: of the wall
+    time of the faster loop; share_on_idle_cores: of path over the processor time of the loop of one thread; load,
+    provenance.
     """
     load = [os.getloadavg()[0]]
     found, paths = {name: [] for name in WAYS}, []

@@ -39,9 +39,7 @@ class CaseUnknown(SceneError):
 def chosen(names):
     """Cases of these names; `*` stands for any ending, no name for all.
 
-    Raises
-    ------
-    CaseUnknown
+    Raises CaseUnknown.
     """
     known, found = cases(), []
     for name in names or known:

@@ -55,19 +55,12 @@ def columns():
 def critical_map(chosen=None, progress=None):
     """Predicted and actual critical time steps of all columns.
 
-    Parameters
-    ----------
-    chosen : iterable of (str, Column) or None
-        All of `columns` when None.
-    progress : callable or None
-        Called with (number done, number of all).
+    chosen : iterable of (str, Column) or None, all of `columns` when None;  progress : callable or None, called with
+    (number done, number of all).
 
-    Returns
-    -------
-    xarray.Dataset
-        Dimension configuration; the fields of `Column`; family; altitude, spectral (predicted critical steps) and
-        actual [s]; altitude_ratio, spectral_ratio: predicted / actual; excess of the spectral radius over 1 at half
-        the actual step; leak [-].
+    Returns xarray.Dataset: dimension configuration; the fields of `Column`; family; altitude, spectral (predicted
+    critical steps) and actual [s]; altitude_ratio, spectral_ratio: predicted / actual; excess of the spectral radius
+    over 1 at half the actual step; leak [-].
     """
     import xarray as xr
     from threadpoolctl import threadpool_limits

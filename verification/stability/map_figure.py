@@ -12,10 +12,7 @@ SETS = (("spectral", True, NOW), ("spectral", False, "0.45"), ("altitude", True,
 def draw_map(linear, path):
     """Predicted over actual critical time step over moduli, permeability and mesh size, positions, and element shape.
 
-    Parameters
-    ----------
-    linear : xarray.Dataset
-        Of :func:`verification.stability.linear.critical_map`.
+    linear : xarray.Dataset, of :func:`verification.stability.linear.critical_map`.
     """
     with picture(path, 8.4, 7.6) as figure:
         axes = figure.subplots(3, 2)

@@ -18,24 +18,14 @@ ALLOWED = (0.7, 1.0)  # predicted over actual
 def stability(names, linear, out, tell, say=lambda text: None):
     """Run what is asked for.
 
-    Parameters
-    ----------
-    names : list of str
-        Cases; `*` stands for any ending; all, and the linear analysis, when empty.
-    linear : bool
-        Only the linear analysis.
-    out : pathlib.Path or None
-        Folder to write to.
-    tell : callable
-        Called with a line of text for every part.
-    say : callable
-        Called with a text about what is being computed.
+    names : list of str, cases; `*` stands for any ending; all, and the linear analysis, when empty;
+    linear : bool, only the linear analysis;
+    out : pathlib.Path or None, folder to write to;
+    tell : callable, called with a line of text for every part;
+    say : callable, called with a text about what is being computed.
 
-    Returns
-    -------
-    dict
-        date, revision, machine; linear: `families` of the map, None when not run; extremes: list of dicts;
-        files: list of paths;  faults: list of sentences.
+    Returns a dict: date, revision, machine; linear: `families` of the map, None when not run; extremes: list of dicts;
+    files: list of paths;  faults: list of sentences.
     """
     todo = [] if linear else chosen(names)
     page = None if out is None else Page(Path(out) / "stability.md", "Stability", ("made", "map", "extremes"))
