@@ -87,12 +87,10 @@ def write_data(path, data):
 @contextmanager
 def picture(path, width, height):
     """A figure of so many inches in the style of the docs, saved on leaving, in a folder that is made when absent."""
-    import matplotlib
+    from coupling.figures import RESOLUTION
+    from coupling.figures.picture import styled
 
-    from coupling.figures import RESOLUTION, STYLE, Picture
-
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(width, height), layout="constrained")
+    with styled(width, height) as figure:
         yield figure
         Path(path).parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, dpi=RESOLUTION)

@@ -4,7 +4,7 @@ import matplotlib
 import numpy as np
 from matplotlib.lines import Line2D
 
-from coupling.figures.picture import STYLE, Picture
+from coupling.figures.picture import styled
 from coupling.figures.polar import around_zero, at_time, closed_curve, crown_up, legend_below
 from coupling.figures.tunnel import joints_of, mark_joints
 from structure.response import FORCES, SHOWN
@@ -24,8 +24,7 @@ def forces_compared(responses):
     """
     one = next(iter(responses.values()))
     times = [0, -1] if one.sizes["time"] > 1 else [0]
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(7.4, 3.0 * len(times) + 2.2), layout="constrained")
+    with styled(7.4, 3.0 * len(times) + 2.2) as figure:
         grid = figure.add_gridspec(len(times) + 1, 3, height_ratios=[*[3.0] * len(times), 1.8])
         for row, time in enumerate(times):
             for column, name in enumerate(FORCES):
@@ -80,8 +79,7 @@ def joints_compared(responses):
     abscissa = one["inflow_mass" if mass else "time"].values
     joints = one["joint"].values
     colours = matplotlib.colormaps["viridis"](np.linspace(0, 0.9, len(joints)))
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(7.4, 3.2), layout="constrained")
+    with styled(7.4, 3.2) as figure:
         axes = figure.subplots(1, 3)
         for axis, name in zip(axes, JOINTS, strict=True):
             for response, dash in zip(responses.values(), DASHES, strict=False):

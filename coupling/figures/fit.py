@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-import matplotlib
 import numpy as np
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
-from coupling.figures.picture import GATE, INITIAL, NOW, STYLE, Picture
+from coupling.figures.picture import GATE, INITIAL, NOW, Picture, styled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,8 +25,7 @@ def fit_bands(fit: xr.Dataset, names: list[str], shown: Callable[[str], tuple[st
     parameters = fit["parameter"].values.tolist()
     count = len(parameters) + 1 + len(names)
     rows = -(-count // COLUMNS)
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(7.4, 0.5 + 1.9 * rows), layout="constrained")
+    with styled(7.4, 0.5 + 1.9 * rows) as figure:
         axes = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
         for axis, name in zip(axes, parameters, strict=False):
             _parameter(axis, fit, name)

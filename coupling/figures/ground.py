@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-import matplotlib
 import numpy as np
 import xarray as xr
 from matplotlib.collections import EllipseCollection, PolyCollection
@@ -12,7 +11,7 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.ticker import MaxNLocator
 
 from coupling.datasets.geometry import gate_of, tunnel_of
-from coupling.figures.picture import STYLE, Picture
+from coupling.figures.picture import Picture, styled
 from coupling.figures.tunnel import draw_linings
 from coupling.postprocess.elements import cell_means, element_areas, element_of_points
 
@@ -54,8 +53,7 @@ def fields_around_tunnel(
     half = 3.0 * radius if half_width is None else half_width
     data, fields = _fields(points, x0, y0, half)
     full = None if mesh is None else _full_elements(data, mesh)
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(7.2, 6.4), layout="constrained")
+    with styled(7.2, 6.4) as figure:
         axes = figure.subplots(2, 2, sharex=True, sharey=True)
         for axis, (title, values, colours, norm, extend) in zip(axes.flat, fields, strict=True):
             if norm is None:
@@ -117,8 +115,7 @@ def mesh_near_gate(mesh: xr.Dataset, half_width: float | None = None) -> Picture
     if gate is not None:
         middle = tunnel.at(gate.angle, 0.5 * (tunnel.outer + tunnel.inner))
         views.append((*middle, 5 * gate.width if half_width is None else half_width))
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(3.6 * len(views), 3.5), layout="constrained")
+    with styled(3.6 * len(views), 3.5) as figure:
         axes = np.atleast_1d(figure.subplots(1, len(views)))
         for axis, (x, y, half), line in zip(axes, views, (0.2, 0.4), strict=False):
             near = (np.abs(corners - [x, y]) < 2 * half).all(axis=(1, 2))

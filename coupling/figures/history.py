@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import matplotlib
-
-from coupling.figures.picture import GATE, NOW, SECOND, STYLE, Picture
+from coupling.figures.picture import GATE, NOW, SECOND, Picture, styled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -15,8 +13,7 @@ if TYPE_CHECKING:
 def inflow(history: xr.Dataset) -> Picture:
     """Inflow mass, and areas of flow zone and disturbed zone, over time."""
     time = history["time"].values
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(4.6, 4.4), layout="constrained")
+    with styled(4.6, 4.4) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True)
         upper.plot(time, history["inflow_mass"].values, color=NOW)
         upper.set_ylabel("inflow mass [kg/m]")

@@ -1,7 +1,10 @@
 """How pictures look, and the figure that they are drawn on."""
 
 import io
+from collections.abc import Iterator
+from contextlib import contextmanager
 
+import matplotlib
 from matplotlib.figure import Figure
 
 STYLE = {
@@ -30,3 +33,10 @@ class Picture(Figure):
         image = io.BytesIO()
         self.savefig(image, format="png")
         return image.getvalue()
+
+
+@contextmanager
+def styled(width: float, height: float, layout: str | None = "constrained") -> Iterator[Picture]:
+    """A picture of so many inches, in the style of all while the block draws it."""
+    with matplotlib.rc_context(STYLE):
+        yield Picture(figsize=(width, height), layout=layout)

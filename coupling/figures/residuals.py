@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import matplotlib
 import numpy as np
 
-from coupling.figures.picture import GATE, INITIAL, NOW, STYLE, Picture
+from coupling.figures.picture import GATE, INITIAL, NOW, Picture, styled
 from coupling.measurements import QUANTITIES
 
 if TYPE_CHECKING:
@@ -23,8 +22,7 @@ def residuals(misfit: xr.Dataset) -> Picture:
         Of :func:`coupling.measurements.misfit`.
     """
     names = misfit["quantity"].values.tolist()
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(7.4, 0.6 + 1.9 * len(names)), layout="constrained")
+    with styled(7.4, 0.6 + 1.9 * len(names)) as figure:
         axes = figure.subplots(len(names), 2, squeeze=False)
         for (values, left), name in zip(axes, names, strict=True):
             own = misfit.isel(measurement=np.flatnonzero(misfit["name"].values == name))

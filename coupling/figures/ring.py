@@ -6,12 +6,11 @@ import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import matplotlib
 import numpy as np
 from matplotlib.patches import Annulus
 
 from coupling.datasets.geometry import gate_of, gate_tunnel, on_tunnel
-from coupling.figures.picture import GATE, INITIAL, NOW, STYLE, Picture
+from coupling.figures.picture import GATE, INITIAL, NOW, Picture, styled
 from coupling.figures.polar import around_zero, at_time, closed_curve, crown_up, legend_below, radial_ticks
 from coupling.figures.tunnel import joints_of, mark_gate, mark_joints
 from coupling.postprocess.extremes import extremes
@@ -41,8 +40,7 @@ def pressures_polar(
     pressures = on_tunnel(pressures, tunnel)
     angle = np.radians(pressures["theta"].values)
     first, now = pressures.isel(time=0), pressures.isel(time=time)
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(7.2, 4.0), layout="constrained")
+    with styled(7.2, 4.0) as figure:
         axes = figure.subplots(1, 2, subplot_kw={"projection": "polar"})
         for axis, name in zip(axes, ("soil_pressure", "water_pressure"), strict=True):
             crown_up(axis)
@@ -73,8 +71,7 @@ def internal_forces(response: xr.Dataset, time: int = -1) -> Picture:
     angle = np.radians(response["theta"].values)
     first, now = response.isel(time=0), response.isel(time=time)
     found = extremes(now)
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(7.4, 3.15), layout="constrained")
+    with styled(7.4, 3.15) as figure:
         axes = figure.subplots(1, 3, subplot_kw={"projection": "polar"})
         for axis, name in zip(axes, FORCES, strict=True):
             crown_up(axis)
@@ -117,8 +114,7 @@ def deformed_ring(response: xr.Dataset, time: int = -1) -> Picture:
     largest = max(float(np.hypot(*shape).max()) for shape in shapes)
     factor = _round_down(0.18 * radius / max(largest, 1e-12))
     joints = np.radians(joints_of(response))
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(4.6, 4.7), layout="constrained")
+    with styled(4.6, 4.7) as figure:
         axis = figure.subplots()
         axis.add_patch(Annulus((0, 0), outer, outer - inner, fc="0.92", ec="0.8", lw=0.5, zorder=0))
         styles = ({"color": INITIAL, "ls": (0, (4, 2)), "lw": 1.1, "label": "initial"}, {"color": NOW})

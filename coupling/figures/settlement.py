@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import matplotlib
 import numpy as np
 
-from coupling.figures.picture import GATE, INITIAL, NOW, STYLE, Picture
+from coupling.figures.picture import GATE, INITIAL, NOW, Picture, styled
 from coupling.postprocess.settlement import gauss
 
 if TYPE_CHECKING:
@@ -30,8 +29,7 @@ def settlement_trough(settlement: xr.DataArray, trough: xr.Dataset) -> Picture:
     x, down = now["x"].values, 1e3 * now.values
     last = {name: float(trough[name][-1]) for name in trough.data_vars}
     told = f"largest {1e3 * last['largest']:.3g} mm, volume loss {100 * last['volume_loss']:.3g} %"
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(5.6, 3.2), layout="constrained")
+    with styled(5.6, 3.2) as figure:
         axis = figure.subplots()
         axis.plot(x, down, "o", ms=3, color=NOW, label="points of the surface")
         if np.isfinite(last["width"]):

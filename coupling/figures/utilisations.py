@@ -6,7 +6,7 @@ import matplotlib
 import numpy as np
 from matplotlib.colors import Normalize
 
-from coupling.figures.picture import GATE, INITIAL, STYLE, Picture
+from coupling.figures.picture import GATE, INITIAL, styled
 from structure.limits import UTILISATIONS
 from structure.response import SHOWN
 
@@ -27,8 +27,7 @@ def checks(checked):
     if "largest_utilisation" not in checked:
         raise ValueError("checks: the dataset must come from structure.check(response, limits), got a plain response")
     with_section = "section_utilisation" in checked
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(7.4 if with_section else 4.2, 3.6), layout="constrained")
+    with styled(7.4 if with_section else 4.2, 3.6) as figure:
         axes = np.atleast_1d(figure.subplots(1, 2 if with_section else 1))
         if with_section:
             _diagram(figure, axes[0], checked)

@@ -9,13 +9,11 @@ indices.
 
 import json
 
-import matplotlib
 import numpy as np
 import xarray as xr
 from scipy.stats import spearmanr
 
-from coupling.figures import STYLE
-from coupling.figures.picture import Picture
+from coupling.figures.picture import styled
 from coupling.studies.design import AS_IT_IS
 
 #: Fewest values of which a rank correlation says anything.
@@ -163,9 +161,8 @@ def tornado(result, label: str = "", scale: float = 1.0):
     -------
     matplotlib.figure.Figure
     """
-    with matplotlib.rc_context(STYLE):
-        names = result["parameter"].values[::-1]
-        figure = Picture(figsize=(5.6, 1.0 + 0.32 * len(names)), layout="constrained")
+    names = result["parameter"].values[::-1]
+    with styled(5.6, 1.0 + 0.32 * len(names)) as figure:
         axes = figure.subplots()
         low, high = scale * result["low"].values[::-1], scale * result["high"].values[::-1]
         place = np.arange(len(names))
@@ -198,8 +195,7 @@ def scatter(study, quantity, label: str = "", scale: float = 1.0):
     """
     names = [str(name) for name in sensitivity(study, quantity)["parameter"].values]
     parameters = parameters_of(study)
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(min(2.4 * len(names) + 0.6, 10), 2.6), layout="constrained")
+    with styled(min(2.4 * len(names) + 0.6, 10), 2.6) as figure:
         panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
         for axes, name in zip(panels, names, strict=True):
             values = parameters[name]

@@ -1,11 +1,9 @@
 """Figures 19 to 23 of the published study: cases beside each other at 1000 kg/m, by gate, cover and soil."""
 
-import matplotlib
 import numpy as np
 
 from coupling import postprocess
-from coupling.figures import STYLE
-from coupling.figures.picture import Picture
+from coupling.figures.picture import styled
 from coupling.figures.ring import centred
 from verification.published.lining_figures import JOINTS, rings
 
@@ -76,8 +74,7 @@ def _rings(cases, rows):
 
 def _bars(cases, rows, labels, what):
     """One row of bar charts a quantity, title to function of a run; one column a group."""
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(7.4, 1.8 * len(rows) + 0.9), layout="constrained")
+    with styled(7.4, 1.8 * len(rows) + 0.9) as figure:
         axes = np.atleast_2d(figure.subplots(len(rows), len(GROUPS), sharey="row", sharex=True))
         for line, (title, values) in zip(axes, rows.items(), strict=True):
             for axis, group in zip(line, GROUPS, strict=True):

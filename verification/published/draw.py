@@ -2,12 +2,11 @@
 
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 
 from coupling import postprocess
-from coupling.figures import GATE, NOW, RESOLUTION, STYLE, deformed_ring
-from coupling.figures.picture import Picture
+from coupling.figures import GATE, NOW, RESOLUTION, deformed_ring
+from coupling.figures.picture import styled
 from verification.published import case_figures, ground_figures, lining_figures
 from verification.published.evidence import initial_theory
 
@@ -88,8 +87,7 @@ def draw_bands(verdicts, folder: str | Path) -> dict[str, Path]:
              and v.found.value / v.statement.stated[0] > 0 and v.statement.text != "joints that turn most"]  # fmt: skip
 
     def draw():
-        with matplotlib.rc_context(STYLE):
-            figure = Picture(figsize=(6.2, 0.8 + 0.2 * len(shown)), layout="constrained")
+        with styled(6.2, 0.8 + 0.2 * len(shown)) as figure:
             axis = figure.subplots()
             for row, v in enumerate(reversed(shown)):
                 theirs, colour = v.statement.stated[0], GATE if v.agrees == "no" else NOW

@@ -7,9 +7,9 @@ from matplotlib.tri import Triangulation
 
 from coupling import postprocess
 from coupling.datasets.geometry import tunnel_of
-from coupling.figures import GATE, INITIAL, NOW, SECOND, STYLE
+from coupling.figures import GATE, INITIAL, NOW, SECOND
 from coupling.figures.ground import FIELD_COLOURS, frame_view
-from coupling.figures.picture import Picture
+from coupling.figures.picture import styled
 from coupling.figures.tunnel import draw_linings
 
 #: Displacements that bound the flow zone and the disturbed zone [mm].
@@ -23,8 +23,7 @@ def mass_colours(count):
 
 def settlement_troughs(settlement, masses):
     """Settlement of the ground surface (time, x) at some inflow masses [kg/m], with the width of each trough."""
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(5.6, 3.2), layout="constrained")
+    with styled(5.6, 3.2) as figure:
         axis = figure.subplots()
         for mass, colour in zip(masses, mass_colours(len(masses)), strict=True):
             now = postprocess.at_inflow(settlement, mass)["settlement"]
@@ -43,8 +42,7 @@ def inflow_and_stages(history):
     """Inflow mass and areas of both zones over time, with the three stages of the flow zone."""
     stages, time = postprocess.flow_zone_stages(history), history["time"].values
     nodes = [float(time[0]), *stages.bends, float(time[-1])]
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(5.2, 4.6), layout="constrained")
+    with styled(5.2, 4.6) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True)
         upper.plot(time, history["inflow_mass"], color=NOW)
         upper.set_ylabel("inflow mass [kg/m]")
@@ -84,8 +82,7 @@ def fields_around(fields, mesh, mass):
         ("pore pressure [kPa]", now["pore_pressure"].values / 1e3, Normalize(0.0, 400.0), "max"),
         ("vertical effective stress [kPa]", now["soil_stress_vertical"].values / 1e3, Normalize(0.0, 300.0), "max"),
     )
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(7.2, 6.4), layout="constrained")
+    with styled(7.2, 6.4) as figure:
         axes = figure.subplots(2, 2, sharex=True, sharey=True)
         for axis, (title, values, norm, extend), colours in zip(axes.flat, panels, FIELD_COLOURS, strict=True):
             drawn, triangles, nodal = _draw_field(axis, mesh, values, colours, norm)
@@ -103,8 +100,7 @@ def fields_around(fields, mesh, mass):
 def stress_variation_fields(fields, mesh, masses, name="soil_stress_vertical"):
     """R_sigma (Eq. 10) of a stress around the tunnel at some inflow masses [kg/m]; as :func:`fields_around`."""
     initial = fields[name].isel(time=0, drop=True)
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(3.4 * len(masses) + 0.6, 3.5), layout="constrained")
+    with styled(3.4 * len(masses) + 0.6, 3.5) as figure:
         axes = np.atleast_2d(figure.subplots(1, len(masses), sharey=True))
         for axis, mass in zip(axes[0], masses, strict=True):
             now = postprocess.at_inflow(fields[[name, "inflow_mass"]], mass)[name]
@@ -156,8 +152,7 @@ def stresses_along_axes(horizontal, vertical, masses):
         (vertical, "pore_pressure", "pore pressure [kPa]"),
     )
     diameter = postprocess.gate_diameter(horizontal)
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(7.2, 5.4), layout="constrained")
+    with styled(7.2, 5.4) as figure:
         axes = figure.subplots(2, 2)
         for axis, (data, name, title) in zip(axes.flat, panels, strict=True):
             # the line breaks at the lining, not where a cell between two elements happens to hold no point

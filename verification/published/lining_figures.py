@@ -1,12 +1,11 @@
 """Figures 7 and 13 to 17 of the published study: pressures on the lining and what the ring answers, over the event."""
 
-import matplotlib
 import numpy as np
 
 from coupling import postprocess
 from coupling.datasets.geometry import gate_of
-from coupling.figures import GATE, INITIAL, NOW, STYLE
-from coupling.figures.picture import Picture
+from coupling.figures import GATE, INITIAL, NOW
+from coupling.figures.picture import styled
 from coupling.figures.polar import around_zero, closed_curve, crown_up, radial_ticks
 from structure.response import FORCES, SHOWN
 from verification.published.ground_figures import mass_colours
@@ -28,10 +27,10 @@ def rings(panels, columns, gate=None, joints=(), heads=()):
     heads : sequence of str, titles of the columns; those of the panels then stand beside the rows.
     """
     count = -(-len(panels) // columns)
-    with matplotlib.rc_context(STYLE):
-        height = (2.4 if heads else 3.0) * count + 1.1 * bool(heads)
-        figure = Picture(figsize=(7.4, height), layout=None if heads else "constrained")
-        if heads:  # legends below columns are more than the constrained layout finds room for
+    height = (2.4 if heads else 3.0) * count + 1.1 * bool(heads)
+    # legends below columns are more than the constrained layout finds room for
+    with styled(7.4, height, None if heads else "constrained") as figure:
+        if heads:
             figure.subplots_adjust(0.1, 0.8 / height, 0.98, 1 - 0.4 / height, wspace=0.45, hspace=0.3)
         axes = figure.subplots(count, columns, subplot_kw={"projection": "polar"}, squeeze=False)
         for axis, (title, curves) in zip(axes.flat, panels, strict=True):
@@ -75,8 +74,7 @@ def initial_pressures(pressures, theory):
     """Initial soil and water pressure on every tunnel's lining (theta) against the theoretical ones, one a tunnel."""
     first = pressures.isel(time=0)
     tunnels = [first] if "tunnel" not in first.dims else [first.isel(tunnel=k) for k in range(first.sizes["tunnel"])]
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(3.5 * len(tunnels), 3.2), layout="constrained")
+    with styled(3.5 * len(tunnels), 3.2) as figure:
         axes = np.atleast_1d(figure.subplots(1, len(tunnels), sharey=True))
         for k, (axis, ours, theirs) in enumerate(zip(axes, tunnels, theory, strict=True)):
             for (name, title), colour in zip(PRESSURES.items(), ("#8a5a00", NOW), strict=True):
@@ -150,8 +148,7 @@ def joints_over_inflow(response):
 
 def _over_inflow(panels):
     """Panels beside each other over inflow mass: (title, list of (label, mass, values, keys of a line))."""
-    with matplotlib.rc_context(STYLE):
-        figure = Picture(figsize=(7.4, 2.8), layout="constrained")
+    with styled(7.4, 2.8) as figure:
         axes = figure.subplots(1, len(panels))
         for axis, (title, lines) in zip(axes, panels, strict=True):
             for label, mass, values, style in lines:
