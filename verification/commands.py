@@ -5,9 +5,10 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.table import Table
 
-from coupling.commands.exit_codes import FAILED, JsonPath, checked_json, complain, failures, write_json
+from coupling.commands.exit_codes import FAILED, JsonPath, answering, complain, say
+from coupling.commands.options import Scheduler, Workers
+from coupling.commands.tables import table
 from coupling.runs.progress_line import ProgressLine
 
 PUBLISHED_RUNS = Path("studies/published")
@@ -27,7 +28,7 @@ def accuracy_command(
 
     JSON: see `verification.accuracy.report.problem_ladders`; with --scene `verification.sensitivity.mesh.write_ladder`.
     """
-    with failures(), checked_json(json_path):
+    with answering(json_path) as answer:
         from verification.accuracy.report import problem_ladders
         from verification.sensitivity.mesh import scene_ladder
 
@@ -36,11 +37,17 @@ def accuracy_command(
             data = scene_ladder(scene, inflow_mass, out, tell)
         else:
             data = problem_ladders(problems or [], fast, out, tell)
-        table = Table("problem", "error", "limit", "CPU s", "default over the best of what costs no more")
-        for name, row in data.get("problems", {}).items():
-            limit = f"{row['limit']:.2g}" if row["within"] else f"[red]{row['limit']:.2g} exceeded[/red]"
-            table.add_row(name, f"{row['error']:.2e}", limit, f"{row['cpu_seconds']:.2f}", f"{row['excess']:.2f}")
-        _show(json_path, data, [table] * (scene is None), [f"page: {data['page']}"])
+        if answer(data):
+            rows = (
+                (name, f"{row['error']:.2e}",
+                 f"{row['limit']:.2g}" if row["within"] else f"[red]{row['limit']:.2g} exceeded[/red]",
+                 f"{row['cpu_seconds']:.2f}", f"{row['excess']:.2f}")
+                for name, row in data.get("problems", {}).items()
+            )  # fmt: skip
+            if scene is None:
+                heads = ("problem", "error", "limit", "CPU s", "default over the best of what costs no more")
+                Console().print(table(heads, rows))
+            say(f"page: {data['page']}")
 
 
 def bench_command(
@@ -57,7 +64,7 @@ def bench_command(
     """
     if step and out is not None:
         raise typer.BadParameter("--step measures too little for a page; leave out --step or --out")
-    with failures(), checked_json(json_path):
+    with answering(json_path) as answer:
         from coupling.scenes.scene import load_scene
         from verification.speed.command import bench
         from verification.speed.report import bench_page, facts, write
@@ -65,15 +72,14 @@ def bench_command(
         page = None if out is None else bench_page(out)
         data = bench(load_scene(scene), step, large, Console(stderr=True).print)
         data["files"] = write(data, page) if page is not None else []
-        table = Table("measured", "")
-        for row in facts(data):
-            table.add_row(*row)
-        for row in (*data.get("configurations", ()), *data.get("sizes", ())):
-            what = row.get("configuration", f"{row.get('points')} points in a box")
-            table.add_row(f"{what}, million point-steps a CPU s", f"{row['points_per_second'] / 1e6:.2f}")
-        for name, seconds in data["kernels"].items():
-            table.add_row(f"kernel {name}, ns a point-step", f"{1e9 * seconds:.1f}")
-        _show(json_path, data, [table], data["files"])
+        if answer(data):
+            rows = list(facts(data))
+            for row in (*data.get("configurations", ()), *data.get("sizes", ())):
+                what = row.get("configuration", f"{row.get('points')} points in a box")
+                rows.append((f"{what}, million point-steps a CPU s", f"{row['points_per_second'] / 1e6:.2f}"))
+            rows += [(f"kernel {name}, ns a point-step", f"{1e9 * s:.1f}") for name, s in data["kernels"].items()]
+            Console().print(table(("measured", ""), rows))
+            _say_all(data["files"])
 
 
 def stability_command(
@@ -86,12 +92,15 @@ def stability_command(
 
     JSON: keys of `verification.stability.report.stability`. Exit code 3 when one of its `faults` is found.
     """
-    with failures(), checked_json(json_path):
+    with answering(json_path) as answer:
         from verification.stability.report import shown_tables, stability
 
         with ProgressLine() as line:
             data = stability(case or [], linear, out, Console(stderr=True).print, line.say)
-        _show(json_path, data, shown_tables(data), data["files"])
+        if answer(data):
+            for each in shown_tables(data):
+                Console().print(each)
+            _say_all(data["files"])
     if data["faults"]:
         complain("\n".join(data["faults"]), FAILED)
 
@@ -105,26 +114,27 @@ def published_command(
     page_only: Annotated[bool, typer.Option("--page-only", help="Run nothing: page and figures of what is there.")] = (
         False
     ),
-    workers: Annotated[int | None, typer.Option(min=0, help="Processes; all cores when left out, 0: this one.")] = None,
-    scheduler: Annotated[str | None, typer.Option(help="Address of a running dask scheduler to use instead.")] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     json_path: JsonPath = None,
 ):
     """The published study, whole: its cases, other meshes, what it does not state; page and figures. Rerun to resume.
 
     JSON: keys of `verification.published.page.write_page`, and `studies`: keys of `coupling.studies.stored.run_study`.
     """
-    with failures(), checked_json(json_path):
+    with answering(json_path) as answer:
         from verification.published.page import write_page
         from verification.published.runs import run_all
 
         studies = [] if page_only else run_all(out, quick, workers, scheduler, Console(stderr=True))
         data = write_page(out, page if page is not None else out) | {"studies": studies}
-        table = Table("statement", "published", "ours", "agrees")
-        for row in data["answers"]:
-            verdict = "[red]no[/red]" if row["agrees"] == "no" else row["agrees"]
-            table.add_row(*(row[name].replace("[", "\\[") for name in ("statement", "published", "ours")), verdict)
-        missing = [f"not finished: {', '.join(data['missing'])}"] if data["missing"] else []
-        _show(json_path, data, [table], [*missing, f"page: {data['page']}"])
+        if answer(data):
+            heads = ("statement", "published", "ours")
+            rows = ((*(row[name].replace("[", "\\[") for name in heads), row["agrees"].replace("no", "[red]no[/red]"))
+                    for row in data["answers"])  # fmt: skip
+            Console().print(table((*heads, "agrees"), rows))
+            _say_all([f"not finished: {', '.join(data['missing'])}"] * bool(data["missing"]))
+            say(f"page: {data['page']}")
         if any(case["status"] == "failed" for one in studies for case in one["cases"]):
             raise typer.Exit(FAILED)
 
@@ -138,19 +148,14 @@ def figures_command(
 
     JSON: `figures`: number of the published figure to path.
     """
-    with failures(), checked_json(json_path):
+    with answering(json_path) as answer:
         from verification.published.draw import draw_study
 
         figures = {number: str(path) for number, path in draw_study(study, out or study / "figures").items()}
-        _show(json_path, {"figures": figures}, [], [f"figure {number}: {path}" for number, path in figures.items()])
+        if answer({"figures": figures}):
+            _say_all(f"figure {number}: {path}" for number, path in figures.items())
 
 
-def _show(json_path, data, tables, lines):
-    """Write the JSON; unless that is what is printed, print tables and lines."""
-    write_json(json_path, data)
-    if str(json_path) != "-":
-        console = Console()
-        for table in tables:
-            console.print(table)
-        for line in lines:
-            console.print(line, highlight=False, soft_wrap=True)
+def _say_all(lines):
+    for line in lines:
+        say(line)

@@ -5,11 +5,11 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.table import Table
 
 from coupling.commands.exit_codes import JsonPath, answering, say
 from coupling.commands.options import SOURCE, RingScene
 from coupling.commands.own_folder import claim
+from coupling.commands.tables import table
 from coupling.refused import Refused
 
 FOLDER, DIFFERENCES = "comparison", "differences.nc"
@@ -172,7 +172,5 @@ def _differences_table(rows, title):
     from coupling.responses.comparison import HEADS, difference_cells
 
     causes = any(row["cause"] for row in rows)
-    table = Table(*HEADS, *(("known cause",) if causes else ()), title=title)
-    for row in rows:
-        table.add_row(*difference_cells(row), *((row["cause"] or "-",) if causes else ()))
-    return table
+    cells = ((*difference_cells(row), *((row["cause"] or "-",) if causes else ())) for row in rows)
+    return table((*HEADS, *(("known cause",) if causes else ())), cells, title)

@@ -6,11 +6,11 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.table import Table
 
 from coupling.commands.exit_codes import JsonPath, answering, say, warn
-from coupling.commands.options import SceneName
+from coupling.commands.options import SceneName, Scheduler, Workers
 from coupling.commands.own_folder import claim
+from coupling.commands.tables import table
 
 DATA, FIGURE = "fit.nc", "fit.png"
 #: Below such a probability of the closest draw the scene does not explain the measurements.
@@ -24,8 +24,8 @@ def fit_command(
     measurements: Annotated[Path, typer.Argument(help="As of `gush misfit`: CSV table, or netCDF-4 file.")],
     priors: Annotated[Path, typer.Option(help="TOML file: what is fitted, between which bounds, by how many runs.")],
     out: Annotated[Path | None, typer.Option(help="Folder; fits/SCENE when left out. Its runs are not rerun.")] = None,
-    workers: Annotated[int | None, typer.Option(min=0, help="Processes; all cores when left out, 0: this one.")] = None,
-    scheduler: Annotated[str | None, typer.Option(help="Address of a running dask scheduler to use instead.")] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     json_path: JsonPath = None,
 ):
     """Fit parameters of a scene to measurements, and predict forces, utilisations and inflow in bands. Rerun to resume.
@@ -83,35 +83,35 @@ def _tell_doubts(data):
 
 def _tables(data):
     heads = ("before", "5 %", "median", "95 %", "unit")
-    parameters = Table("parameter", *heads, title=f"{data['scene']} after {data['measurements']}, {data['runs']} runs")
-    for name, one in data["parameters"].items():
-        parameters.add_row(name, *_cells(one, 1.0))
-    bands = Table("at the last time", *heads, title=f"what follows, at {data['time']:.3g} s")
-    for one in data["predictions"].values():
-        bands.add_row(one["label"], *_cells(one, one["scale"]))
-    limits = Table("limit", "passed by then", "at the earliest (5 %)", "median", "at the latest (95 %)")
-    for one in data["limits"].values():
-        times = (one["passing_time"][end] for end in ("low", "median", "high"))
-        told = (f"{time:.3g} s" if time != float("inf") else "later or never" for time in times)
-        limits.add_row(one["label"], f"{one['share_passing']:.0%}", *told)
+    parameters = ((name, *_cells(one, 1.0)) for name, one in data["parameters"].items())
+    yield table(("parameter", *heads), parameters, f"{data['scene']} after {data['measurements']}, {data['runs']} runs")
+    bands = ((one["label"], *_cells(one, one["scale"])) for one in data["predictions"].values())
+    yield table(("at the last time", *heads), bands, f"what follows, at {data['time']:.3g} s")
+    if data["limits"]:
+        limits = ((one["label"], f"{one['share_passing']:.0%}", *map(_passing, one["passing_time"].values()))
+                  for one in data["limits"].values())  # fmt: skip
+        yield table(("limit", "passed by then", "at the earliest (5 %)", "median", "at the latest (95 %)"), limits)
+    emulators = (
+        (name.replace("_", " "), f"{one['scale'] * one['error']:.3g} {one['unit']}", f"{one['explained']:.1%}",
+         f"{one['standardised']:.2f}") for name, one in data["emulators"].items()
+    )  # fmt: skip
     heads = ("emulator", "error", "variance explained", "error over its own")
-    emulators = Table(*heads, title="cross-validation: each run left out in turn")
-    for name, one in data["emulators"].items():
-        error = f"{one['scale'] * one['error']:.3g} {one['unit']}"
-        emulators.add_row(name.replace("_", " "), error, f"{one['explained']:.1%}", f"{one['standardised']:.2f}")
-    return [parameters, bands, *([limits] if data["limits"] else []), emulators, _sensitivity_table(data)]
+    yield table(heads, emulators, "cross-validation: each run left out in turn")
+    names = list(data["parameters"])
+    sensitivity = (
+        (data["predictions"][quantity]["label"],
+         *(f"{one[name]['first_order']:.2f}, {one[name]['total_order']:.2f}" for name in names))
+        for quantity, one in data["sensitivity"].items()
+    )  # fmt: skip
+    heads = ("share of variance alone, with others", *names)
+    yield table(heads, sensitivity, "which parameter decides, at the last time")
+
+
+def _passing(time):
+    return f"{time:.3g} s" if time != float("inf") else "later or never"
 
 
 def _cells(one, scale):
     before, after = one["prior"], one["posterior"]
     middle = (f"{scale * after[end]:.4g}" for end in ("low", "median", "high"))
     return f"{scale * before['low']:.4g} to {scale * before['high']:.4g}", *middle, one["unit"]
-
-
-def _sensitivity_table(data):
-    names = list(data["parameters"])
-    table = Table("share of variance alone, with others", *names, title="which parameter decides, at the last time")
-    for quantity, one in data["sensitivity"].items():
-        cells = (f"{one[name]['first_order']:.2f}, {one[name]['total_order']:.2f}" for name in names)
-        table.add_row(data["predictions"][quantity]["label"], *cells)
-    return table

@@ -5,9 +5,9 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.table import Table
 
 from coupling.commands.exit_codes import JsonPath, answering, plain, say
+from coupling.commands.tables import table
 
 
 def info_command(
@@ -23,14 +23,11 @@ def info_command(
 
         data = describe(path)
         if answer(data):
-            table = Table("what", "")
             say(plain(f"{data['path']}: {data['kind']}"))
-            if "bytes" in data:
-                size = data["bytes"]
-                table.add_row("size", f"{size} bytes" if size < 1e5 else f"{size / 1e6:.3g} MB")
-            for name, value in data["facts"].items():
-                shown = f"{value:.4g}" if isinstance(value, float) else plain(value)
-                table.add_row(name.replace("[", "\\["), shown.replace("[", "\\["))
-            for command in data["next"]:
-                table.add_row("next", plain(command).replace("[", "\\["))
-            Console().print(table)
+            size, rows = data.get("bytes"), []
+            if size is not None:
+                rows.append(("size", f"{size} bytes" if size < 1e5 else f"{size / 1e6:.3g} MB"))
+            rows += [(name, f"{value:.4g}" if isinstance(value, float) else plain(value))
+                     for name, value in data["facts"].items()]  # fmt: skip
+            rows += [("next", plain(command)) for command in data["next"]]
+            Console().print(table(("what", ""), [[cell.replace("[", "\\[") for cell in row] for row in rows]))

@@ -10,6 +10,7 @@ from rich.table import Table
 from coupling.commands.exit_codes import JsonPath, answering, plain, say, warn
 from coupling.commands.options import Run
 from coupling.commands.own_folder import claim
+from coupling.commands.tables import table
 
 FOLDER, DATA, FIGURE = "misfit", "misfit.nc", "residuals.png"
 #: Most measurements that the terminal shows, those with the largest residuals; files hold all of them.
@@ -82,12 +83,10 @@ def _known(value):
 
 
 def _quantity_table(data):
-    table = Table("quantity", "measurements", "chi square each", "mean residual", "probability")
-    table.title = plain(f"{data['run']} against {data['measurements']}")
-    for row in data["quantities"]:
-        numbers = (f"{row['chi_square']:.3g}", f"{row['mean_residual']:+.2f}", f"{row['probability']:.2g}")
-        table.add_row(row["name"].replace("_", " "), str(row["count"]), *numbers)
-    return table
+    rows = ((row["name"].replace("_", " "), str(row["count"]), f"{row['chi_square']:.3g}",
+             f"{row['mean_residual']:+.2f}", f"{row['probability']:.2g}") for row in data["quantities"])  # fmt: skip
+    heads = ("quantity", "measurements", "chi square each", "mean residual", "probability")
+    return table(heads, rows, plain(f"{data['run']} against {data['measurements']}"))
 
 
 def _residual_table(data):
@@ -96,14 +95,14 @@ def _residual_table(data):
     rows = sorted(data["rows"], key=lambda row: -abs(row["residual"] or 0.0))
     more = f" (the largest {MOST_SHOWN} of {len(rows)})" if len(rows) > MOST_SHOWN else ""
     heads = ("where read", "quantity", "place", "when", "measured", "computed", "residual")
-    table = Table(*heads, title=f"residuals{more}")
-    table.columns[1].min_width = len("convergence")
+    made = Table(*heads, title=f"residuals{more}")
+    made.columns[1].min_width = len("convergence")
     for row in rows[:MOST_SHOWN]:
         shown = QUANTITIES[row["quantity"]].shown
         when = f"{row['time']:.4g} s" if row["time"] is not None else f"{row['inflow_mass']:.4g} kg/m"
         measured = f"{shown.scale * row['measured']:.4g} ± {shown.scale * row['error']:.2g} {shown.unit}"
         reached = row["computed"] is not None
-        table.add_row(
+        made.add_row(
             plain(f"{row['line']} {row['sensor']}".strip()).replace("[", "\\["),
             row["quantity"].replace("_", " ") + (", change" if row["change"] else ""),
             ", ".join(filter(None, (row["place"], "" if row["tunnel"] is None else f"tunnel {row['tunnel']}"))),
@@ -112,4 +111,4 @@ def _residual_table(data):
             f"{shown.scale * row['computed']:.4g}" if reached else "not reached",
             f"{row['residual']:+.2f}" if reached else "",
         )
-    return table
+    return made

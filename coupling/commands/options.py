@@ -36,3 +36,5 @@ Changes = Annotated[
 Threads = Annotated[int | None, typer.Option(min=1, help="Threads; all cores when left out. Does not change results.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print errors only.")]
 Run = Annotated[Path, typer.Argument(help="Folder (or run.nc) of a run, also one that goes on.")]
+Workers = Annotated[int | None, typer.Option(min=0, help="Processes; all cores when left out, 0: this one.")]
+Scheduler = Annotated[str | None, typer.Option(help="Address of a running dask scheduler to use instead.")]

@@ -4,10 +4,10 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.table import Table
 
 from coupling.commands.exit_codes import JsonPath, answering, warn
 from coupling.commands.options import Changes, SceneName, Threads
+from coupling.commands.tables import table
 from coupling.runs.progress_line import duration
 
 
@@ -39,33 +39,29 @@ def plan_command(
 
 
 def _feature_table(data):
-    table = Table("part", "", "why", title=f"{data['scene']}: what is computed")
-    for row in data["features"]:
-        table.add_row(row["feature"], "active" if row["active"] else "left out", row["reason"])
-    return table
+    rows = ((row["feature"], "active" if row["active"] else "left out", row["reason"]) for row in data["features"])
+    return table(("part", "", "why"), rows, f"{data['scene']}: what is computed")
 
 
 def _cost_table(data):
     most = data["steps_to_stop_time"]
     most = "no stop time given" if most is None else f"{most} until the stop time"
-    table = Table("cost", "", title=f"{data['scene']}: what it costs")
-    free = data["free_memory_bytes"]
-    meshed = "nodes" in data
-    if meshed:
-        table.add_row("elements, nodes, points", f"{data['elements']}, {data['nodes']}, {data['points']}")
-        table.add_row("flattest triangle, smallest angle", f"{data['min_altitude']:.3f} m, {data['min_angle']:.0f} deg")
-        table.add_row("time step", f"{1e6 * data['dt']:.0f} µs ({data['dt_limit']})")
-    else:
-        table.add_row("elements, points", f"some {data['elements']}, {data['points']}")
-        table.add_row("time step", f"some {1e6 * data['dt']:.2g} µs")
-    for row in (
+    free, meshed = data["free_memory_bytes"], "nodes" in data
+    rows = [
+        ("elements, nodes, points", f"{data['elements']}, {data['nodes']}, {data['points']}"),
+        ("flattest triangle, smallest angle", f"{data['min_altitude']:.3f} m, {data['min_angle']:.0f} deg"),
+        ("time step", f"{1e6 * data['dt']:.0f} µs ({data['dt_limit']})"),
+    ] if meshed else [
+        ("elements, points", f"some {data['elements']}, {data['points']}"),
+        ("time step", f"some {1e6 * data['dt']:.2g} µs"),
+    ]  # fmt: skip
+    rows += [
         ("simulated time", f"about {data['expected_time']:.2g} s (a guess where an inflow mass ends the run)"),
         ("steps", f"about {data['expected_steps']}, {most}"),
         ("records", f"about {data['records']}"),
         ("memory", f"{data['memory_bytes'] / 1e6:.0f} MB" + (f" of {free / 1e9:.1f} GB free" if free else "")),
-    ):
-        table.add_row(*row)
+    ]
     if meshed:
-        table.add_row("speed measured now", f"{data['point_steps_per_second'] / 1e6:.1f} M point-steps/s")
-        table.add_row("time of stepping", f"about {duration(data['expected_seconds'])}")
-    return table
+        rows.append(("speed measured now", f"{data['point_steps_per_second'] / 1e6:.1f} M point-steps/s"))
+        rows.append(("time of stepping", f"about {duration(data['expected_seconds'])}"))
+    return table(("cost", ""), rows, f"{data['scene']}: what it costs")

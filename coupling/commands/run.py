@@ -6,12 +6,11 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.table import Table
 
 from coupling.commands.events import EventStream
 from coupling.commands.exit_codes import JsonPath, answering, checked_json, say, warn
 from coupling.commands.options import Changes, Quiet, Threads, completed
-from coupling.commands.tables import limits_table, response_table
+from coupling.commands.tables import limits_table, response_table, table
 from coupling.runs.progress_line import ProgressLine
 
 
@@ -90,7 +89,6 @@ def run_command(
 
 
 def _run_table(data):
-    table = Table("quantity", "value", title=f"{data['scene']}: {data['status']}")
     rows = [
         ("simulated time", f"{data['time']:.3f} s"),
         ("inflow mass", f"{data['inflow_mass']:.0f} kg/m"),
@@ -107,6 +105,4 @@ def _run_table(data):
         ("point-steps per CPU second", f"{data['point_steps_per_cpu_second'] / 1e6:.1f} million"),
         ("wall, CPU time", f"{data['wall_seconds']:.0f} s, {data['cpu_seconds']:.0f} s"),
     ]
-    for row in rows:
-        table.add_row(*row)
-    return table
+    return table(("quantity", "value"), rows, f"{data['scene']}: {data['status']}")

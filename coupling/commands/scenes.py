@@ -1,9 +1,9 @@
 """The command `gush scenes`."""
 
 from rich.console import Console
-from rich.table import Table
 
 from coupling.commands.exit_codes import JsonPath, answering
+from coupling.commands.tables import table
 
 
 def scenes_command(json_path: JsonPath = None):
@@ -18,19 +18,15 @@ def scenes_command(json_path: JsonPath = None):
 
         data = {"scenes": [_scene_row(load_scene(name)) for name in scene_names()]}
         if answer(data):
-            table = Table("scene", "soil", "cover", "gate", "tunnels", "until")
-            for row in data["scenes"]:
-                until = [f"{row['stop_inflow_mass']:g} kg/m"] if row["stop_inflow_mass"] else []
-                until += [f"{row['stop_time']:g} s"] if row["stop_time"] else []
-                table.add_row(
-                    row["name"],
-                    row["soil"],
-                    f"{row['cover']:g} m",
-                    "none" if row["gate_angle"] is None else f"{row['gate_angle']:g}°, {row['gate_width']:g} m",
-                    str(row["tunnels"]),
-                    ", ".join(until),
-                )
-            Console().print(table)
+            heads = ("scene", "soil", "cover", "gate", "tunnels", "until")
+            Console().print(table(heads, map(_cells, data["scenes"])))
+
+
+def _cells(row):
+    gate = "none" if row["gate_angle"] is None else f"{row['gate_angle']:g}°, {row['gate_width']:g} m"
+    until = [f"{row['stop_inflow_mass']:g} kg/m"] if row["stop_inflow_mass"] else []
+    until += [f"{row['stop_time']:g} s"] if row["stop_time"] else []
+    return row["name"], row["soil"], f"{row['cover']:g} m", gate, str(row["tunnels"]), ", ".join(until)
 
 
 def _scene_row(scene):

@@ -8,7 +8,8 @@ from rich.console import Console
 from rich.table import Table
 
 from coupling.commands.exit_codes import FAILED, JsonPath, answering, say
-from coupling.commands.options import completed
+from coupling.commands.options import Scheduler, Workers, completed
+from coupling.commands.tables import table
 from structure.response import SHOWN
 
 
@@ -25,8 +26,8 @@ def study_command(
         Path | None,
         typer.Option(help="Folder; that which goes on, or studies/NAME, when left out. What is there is not rerun."),
     ] = None,
-    workers: Annotated[int | None, typer.Option(min=0, help="Processes; all cores when left out, 0: this one.")] = None,
-    scheduler: Annotated[str | None, typer.Option(help="Address of a running dask scheduler to use instead.")] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     json_path: JsonPath = None,
 ):
     """Run many scenes that differ in some parameters, in parallel; one dataset of them all. Rerun to resume.
@@ -47,12 +48,12 @@ def study_command(
 
 
 def _study_table(data):
-    table = Table(title=f"{data['study']}{', ' + data['model'] if data['model'] else ''}")
-    table.add_column("case", min_width=min(22, max(len(case["name"]) for case in data["cases"])))
+    made = Table(title=f"{data['study']}{', ' + data['model'] if data['model'] else ''}")
+    made.add_column("case", min_width=min(22, max(len(case["name"]) for case in data["cases"])))
     axial, bending = SHOWN["axial_force"], SHOWN["bending_moment"]
     for head in ("kg/m", "after s", f"N max {axial.unit}", f"M {bending.unit}", "CPU s"):
-        table.add_column(head, no_wrap=True)
-    table.add_column("status")
+        made.add_column(head, no_wrap=True)
+    made.add_column("status")
     for case in data["cases"]:
         cells = [""] * 5
         if case["status"] == "finished":
@@ -62,14 +63,11 @@ def _study_table(data):
             ends = (f"{bending.scale * moment[end]:.0f}" for end in ("min", "max")) if moment else ()
             cells += [" to ".join(ends) or "-"]
             cells += [f"{case['cpu_seconds']:.1f}"]
-        table.add_row(case["name"], *cells, case["message"] or case["status"])
-    return table
+        made.add_row(case["name"], *cells, case["message"] or case["status"])
+    return made
 
 
 def _limits_table(data):
     from coupling.studies.limits import HEADS, limit_rows
 
-    table = Table(*HEADS)
-    for row in limit_rows(data["limits"], {case["case"]: case["name"] for case in data["cases"]}):
-        table.add_row(*row)
-    return table
+    return table(HEADS, limit_rows(data["limits"], {case["case"]: case["name"] for case in data["cases"]}))

@@ -1,13 +1,21 @@
-"""Tables that several commands show."""
+"""Tables of the terminal: from rows, and those that several commands show."""
 
 from rich.table import Table
 
 from structure.response import FORCES, SHOWN
 
 
+def table(heads, rows, title=None):
+    """A table with headings and a row a line."""
+    made = Table(*heads, title=title)
+    for row in rows:
+        made.add_row(*row)
+    return made
+
+
 def response_table(data, tunnel=None):
     """Extremes of the ring's forces, and its joints; `data` as of `summarise_response`."""
-    table = Table("ring" if tunnel is None else f"ring of tunnel {tunnel}", "initial", "final")
+    rows = []
     for name in FORCES:
         for extreme in ("max", "min"):
             cells = (
@@ -15,20 +23,17 @@ def response_table(data, tunnel=None):
                 f"{data[name][state][f'{extreme}_theta'] % 360:.4g} deg"
                 for state in ("initial", "final")
             )
-            table.add_row(f"{SHOWN[name].short} {extreme} \\[{SHOWN[name].unit}]", *cells)
+            rows.append((f"{SHOWN[name].short} {extreme} \\[{SHOWN[name].unit}]", *cells))
     for name in ("joint_opening", "joint_rotation"):
         if data[name]["final"]:
             scale = SHOWN[name].scale
             cells = (" ".join(f"{scale * value:.2f}" for value in data[name][state]) for state in ("initial", "final"))
-            table.add_row(SHOWN[name].label.replace("[", "\\["), *cells)
-    return table
+            rows.append((SHOWN[name].label.replace("[", "\\["), *cells))
+    return table(("ring" if tunnel is None else f"ring of tunnel {tunnel}", "initial", "final"), rows)
 
 
 def limits_table(found, tunnel=None):
     """Utilisations of limits with where they pass 1; `found` as of :func:`structure.utilisations`."""
     from coupling.postprocess.limits import HEADS, limit_rows
 
-    table = Table(*HEADS, title=None if tunnel is None else f"limits of the ring of tunnel {tunnel}")
-    for row in limit_rows(found):
-        table.add_row(*row)
-    return table
+    return table(HEADS, limit_rows(found), None if tunnel is None else f"limits of the ring of tunnel {tunnel}")
