@@ -9,11 +9,9 @@ def claim(folder, files, own, title):
     folder, files : paths;  own : name of the dataset in it by whose title, which begins so, such a folder is known.
     """
     from coupling.datasets import stored_title
+    from coupling.files.folder import made
 
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except FileExistsError:
-        raise Refused(f"output folder '{folder}': it, or one above it, is a file; choose another --out") from None
+    made(folder)
     there = [file.name for file in files if file.exists()]
     if there and not stored_title(folder / own).startswith(title):
         raise Refused(

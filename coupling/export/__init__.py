@@ -11,7 +11,7 @@ from coupling.export.tables import EXCEL_FILE, write_tables
 from coupling.export.tables import NAMES as TABLE_NAMES
 from coupling.figures.of_run import NAMES as PICTURE_NAMES
 from coupling.figures.of_run import draw_run
-from coupling.files.folder import FIELDS, FIGURES, TABLES
+from coupling.files.folder import FIELDS, FIGURES, TABLES, made
 from coupling.refused import Refused
 
 PICTURES = ("png", "svg", "pdf")
@@ -108,12 +108,8 @@ def _write_xdmf(stem, times, grids):
 
 def _prepared(file, out, kind, home):
     """The folder, `out` or that of the run, made or emptied of an earlier export of that format."""
-    folder = file.path.parent / home if out is None else Path(out)
+    folder = made(file.path.parent / home if out is None else out, "export folder")
     known = [pattern for patterns in FILES.values() for pattern in patterns]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except FileExistsError:
-        raise Refused(f"export folder '{folder}': it, or one above it, is a file; choose another --out") from None
     strange = [p.name for p in folder.iterdir() if not any(fnmatch.fnmatch(p.name, known_) for known_ in known)]
     if strange and not (out is None and home == FIGURES):  # other commands draw there, too
         raise Refused(f"export folder '{folder}': holds other files ({strange[0]}); choose another --out")

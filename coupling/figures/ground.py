@@ -14,6 +14,7 @@ from coupling.datasets.geometry import gate_of, tunnel_of
 from coupling.figures.picture import Picture, styled
 from coupling.figures.tunnel import draw_linings
 from coupling.postprocess.elements import cell_means, element_areas, element_of_points
+from coupling.postprocess.heap import filled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -145,9 +146,7 @@ def _full_elements(data, mesh):
     place = xr.Dataset({name: ("point", data[name]) for name in ("x", "y")})
     element, areas, nodes = element_of_points(place, mesh), element_areas(mesh), mesh["element_nodes"].values
     inside = element >= 0
-    filled = np.bincount(element[inside], data["volume"][inside], len(areas)) / areas
-    at_nodes = cell_means(nodes.ravel(), np.repeat(areas, 3), np.repeat(filled, 3), mesh.sizes["node"])
-    full = at_nodes[nodes].mean(axis=1) >= FULL
+    full = filled(np.bincount(element[inside], data["volume"][inside], len(areas)), areas, nodes, FULL)
     number = np.where(full, np.cumsum(full) - 1, -1)
     corners = np.stack([mesh["x"].values[nodes[full]], mesh["y"].values[nodes[full]]], axis=2)
     return _Full(nodes[full], corners, np.where(inside, number[element], -1))

@@ -30,6 +30,18 @@ def default_folder(scene_name):
     return folder
 
 
+def made(folder, what="output folder"):
+    """The folder, made when absent. Raises Refused: it cannot be made."""
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise Refused(f"{what} '{folder}': it, or one above it, is a file; choose another --out") from None
+    except OSError as error:
+        raise Refused(f"{what} '{folder}': cannot be made: {error.strerror}; choose another --out") from None
+    return folder
+
+
 @contextlib.contextmanager
 def claimed(folder, overwrite=False):
     """Hold a run folder for the time of a run; refuse before anything is touched.
@@ -39,13 +51,7 @@ def claimed(folder, overwrite=False):
 
     Raises Refused: not a folder, in use by another run, not writable, or not empty and `overwrite` not asked for.
     """
-    folder = Path(folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except (FileExistsError, NotADirectoryError):
-        raise Refused(f"output folder '{folder}': it, or one above it, is a file; choose another --out") from None
-    except OSError as error:
-        raise Refused(f"output folder '{folder}': cannot be made: {error.strerror}; choose another --out") from None
+    folder = made(folder)
     with _locked(folder):
         content = _content(folder)
         if content and not overwrite:

@@ -42,6 +42,11 @@ def origin():
     }
 
 
+def made_here(title, event):
+    """Attributes of a dataset that is computed here: conventions, title, :func:`origin`, the event as its history."""
+    return {**origin(), "Conventions": "CF-1.11", "title": title, "history": with_history("", event)}
+
+
 def with_history(history, event):
     """The CF attribute `history` with one more line: when, by which version, what."""
     line = f"{datetime.now(UTC).isoformat(timespec='seconds')} gushing {_version('gushing')}: {event}"

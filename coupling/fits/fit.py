@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, qmc
 from threadpoolctl import threadpool_limits
 
-from coupling.files.provenance import origin, with_history
+from coupling.files.provenance import made_here
 from coupling.fits.emulator import SMALLEST_SPREAD, Emulator, require_scikit_learn
 from coupling.fits.ensemble import FEWEST_A_PARAMETER, Ensemble, read_ensemble
 from coupling.fits.posterior import Likelihood, Sample, sample
@@ -121,8 +121,7 @@ def fitted(plan: FitPlan, given: tuple[Measurement, ...], ensemble: Ensemble) ->
     numbers = {"runs": int(observed.used.sum()), "failed": ensemble.failed, "count": count,
                "chi_square": least / count, "probability": float(chi2.sf(least, count)),
                **{key: getattr(found, key) for key in ("steps", "accepted", "different")}}  # fmt: skip
-    about = {"title": TITLE, "history": with_history("", "parameters fitted to measurements"), "Conventions": "CF-1.11"}
-    return result.assign_attrs(origin() | about | numbers)
+    return result.assign_attrs(made_here(TITLE, "parameters fitted to measurements") | numbers)
 
 
 def observe(ensemble: Ensemble) -> Observed:

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from coupling.datasets import opened
 from coupling.datasets.open_run import Run
-from coupling.files.provenance import origin, with_history
+from coupling.files.provenance import made_here
 from coupling.measurements.measurement import Measurement, error_covariance
 from coupling.measurements.read import read_measurements
 from coupling.measurements.taken import at_measurements
@@ -63,8 +63,7 @@ def misfit(
         raise Refused(f"run '{path}': must get to one of the measurements, it ends before all of them; let it go on")
     dataset = misfit_table(given, values, times)
     whitened = _whitened(given, dataset["name"].values, values - dataset["measured"].values)
-    about = {"title": f"{TITLE}: {path}", "history": with_history("", "run held against measurements")}
-    return _summed(dataset, whitened).assign_attrs(origin() | about, Conventions="CF-1.11")
+    return _summed(dataset, whitened).assign_attrs(made_here(f"{TITLE}: {path}", "run held against measurements"))
 
 
 def misfit_table(given, values, times):

@@ -1,7 +1,6 @@
 """Measurements from a table (CSV), a netCDF-4 file or a dataset; what is wrong in them is named by its line."""
 
 import csv
-import difflib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ from pydantic import ValidationError
 from coupling.datasets import opened
 from coupling.measurements.measurement import Measurement
 from coupling.measurements.quantities import QUANTITIES
-from coupling.refused import Refused
+from coupling.refused import Refused, did_you_mean
 from structure.inputs import mistakes, shortened
 
 COLUMNS = tuple(name for name in Measurement.model_fields if name != "line")
@@ -120,9 +119,7 @@ def _rows_of_table(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
 def _checked_heads(number, heads):
     for name in heads:
         if name not in COLUMNS:
-            near = difflib.get_close_matches(name, COLUMNS, 1)
-            hint = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(COLUMNS)}"
-            raise _Unusable(f"line {number}: unknown column {shortened(name)}; {hint}")
+            raise _Unusable(f"line {number}: unknown column {shortened(name)}; {did_you_mean(name, COLUMNS)}")
     missing = [name for name in REQUIRED if name not in heads]
     if missing or len(set(heads)) < len(heads):
         twice = sorted({name for name in heads if heads.count(name) > 1})
@@ -138,9 +135,7 @@ def _rows_of_dataset(dataset: xr.Dataset) -> Iterator[tuple[str, dict[str, Any]]
         if any(name.endswith(end) and name.removesuffix(end) in dataset for end in ("_error", "_common_error")):
             continue
         if name not in QUANTITIES:
-            near = difflib.get_close_matches(name, QUANTITIES, 1)
-            hint = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(QUANTITIES)}"
-            raise _Unusable(f"{name}: must be a quantity that a run has; {hint}")
+            raise _Unusable(f"{name}: must be a quantity that a run has; {did_you_mean(name, QUANTITIES)}")
         yield from _rows_of_variable(dataset, name)
 
 

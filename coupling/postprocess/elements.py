@@ -7,6 +7,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from coupling.datasets.geometry import gate_position
+from mpm.mesh import areas
 
 #: Quantities of points that are shown: name to (units, long_name).
 QUANTITIES = {
@@ -177,6 +178,4 @@ def element_centres(mesh: xr.Dataset) -> NDArray[np.float64]:
 
 def element_areas(mesh: xr.Dataset) -> NDArray[np.float64]:
     """Areas of all elements, (n_elements,) float64 [m2]."""
-    nodes = mesh["element_nodes"].values
-    x, y = mesh["x"].values[nodes], mesh["y"].values[nodes]
-    return 0.5 * np.abs((x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0]))
+    return np.abs(areas(np.stack([mesh["x"].values, mesh["y"].values], axis=1), mesh["element_nodes"].values))

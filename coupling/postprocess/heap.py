@@ -44,7 +44,7 @@ def heap(points: xr.Dataset, mesh: xr.Dataset) -> dict[str, float]:
 
 
 def filled(
-    volume: NDArray[np.float64], area: NDArray[np.float64], element_nodes: NDArray[np.integer]
+    volume: NDArray[np.float64], area: NDArray[np.float64], element_nodes: NDArray[np.integer], least: float = 0.5
 ) -> NDArray[np.bool_]:
     """Elements below the surface of some material: at least half full on the mean of their nodes.
 
@@ -55,6 +55,8 @@ def filled(
     volume, area : (n_elements,) float64
         Of the material in an element, and of the element [m2].
     element_nodes : (n_elements, 3) int
+    least : float
+        Share of the area around a node that counts as full [-].
 
     Returns
     -------
@@ -63,4 +65,4 @@ def filled(
     corners = element_nodes.ravel()
     held = np.bincount(corners, np.repeat(volume, 3))
     share = held / np.maximum(np.bincount(corners, np.repeat(area, 3)), 1e-300)
-    return share[element_nodes].mean(axis=1) >= 0.5
+    return share[element_nodes].mean(axis=1) >= least

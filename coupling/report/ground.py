@@ -4,6 +4,7 @@ import numpy as np
 
 from coupling.datasets.geometry import Tunnel, gate_of, has_tunnels, tunnel_list, tunnel_of
 from coupling.report.packing import evenly, quantised
+from mpm.mesh import altitudes, angles
 
 BYTES_OF_FIELDS = 1.7e6  # of all snapshots, before they are compressed
 MOST_SNAPSHOTS = 12
@@ -149,33 +150,21 @@ def mesh_picture(mesh):
     """
     x, y = mesh["x"].values, mesh["y"].values
     corners, region = mesh["element_nodes"].values, mesh["region"].values
-    altitude, angle = triangle_quality(x, y, corners)
+    nodes = np.stack([x, y], axis=1)
     whole = len(corners) <= MOST_ELEMENTS
     kept = np.arange(len(corners)) if whole else _nearest_elements(mesh, corners)
     used, renumbered = np.unique(corners[kept], return_inverse=True)
     return {
         "elements": len(corners),
         "nodes": len(x),
-        "min_altitude": float(altitude.min()),
-        "min_angle": float(angle.min()),
+        "min_altitude": float(altitudes(nodes, corners).min()),
+        "min_angle": float(np.degrees(angles(nodes, corners)).min()),
         "whole": whole,
         "x": x[used],
         "y": y[used],
         "corners": renumbered.reshape(-1, 3).astype("u4" if len(used) > 65535 else "u2"),
         "region": region[kept].astype("u1"),
     }
-
-
-def triangle_quality(x, y, corners):
-    """Smallest altitude [m] and smallest angle [degree] of every triangle, each (n,) float64."""
-    p = np.stack([x, y], axis=1)[corners]
-    edge = np.roll(p, -1, axis=1) - p
-    length = np.hypot(edge[..., 0], edge[..., 1])
-    double_area = np.abs(edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0])
-    # at every corner: the area is half the product of its two edges and the sine between them
-    sine = double_area[:, None] / (length * np.roll(length, 1, axis=1))
-    cosine = -np.sum(edge * np.roll(edge, 1, axis=1), axis=2) / (length * np.roll(length, 1, axis=1))
-    return double_area / length.max(axis=1), np.degrees(np.arctan2(sine, cosine)).min(axis=1)
 
 
 def _nearest_elements(mesh, corners):

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from coupling.datasets.geometry import gate_of
-from coupling.files.provenance import origin, with_history
+from coupling.files.provenance import made_here
 from coupling.refused import Refused
 from coupling.responses.respond import respond_by_name
 from structure.response import RESPONSE, SHOWN, Shown
@@ -126,13 +126,7 @@ def _differences(first, second, ring):
     if "inflow_mass" in first:
         dataset["inflow_mass"] = first["inflow_mass"]
     models = f"{second.attrs.get('model', 'second')} less {first.attrs.get('model', 'first')}"
-    dataset.attrs = {
-        **origin(),
-        "Conventions": "CF-1.11",
-        "title": f"{TITLE}: {models}",
-        "history": with_history("", "lining models compared"),
-    }
-    return dataset
+    return dataset.assign_attrs(made_here(f"{TITLE}: {models}", "lining models compared"))
 
 
 def largest_difference(

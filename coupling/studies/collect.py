@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from coupling.datasets.group import read_group_at_once
-from coupling.files.provenance import origin, with_history
+from coupling.files.provenance import made_here
 from coupling.scenes.scene import unit_of
 from coupling.studies.cases import Case, cases
 from coupling.studies.design import Study, StudyError, stored_study
@@ -61,10 +61,7 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     result["status"] = ("case", np.where(done, "finished", "failed"))
     result["message"] = ("case", np.array([failures.get(case.key, "") for case in cases], dtype=str))
     result.attrs = {
-        **origin(),
-        "Conventions": "CF-1.11",
-        "title": f"study {plan.name}",
-        "history": with_history("", "cases collected"),
+        **made_here(f"study {plan.name}", "cases collected"),
         "study": json.dumps(plan.model_dump(mode="json")),
         "failed": int((~done).sum()),
     }

@@ -9,7 +9,7 @@ import xarray as xr
 
 from coupling.datasets import opened, read_attributes, read_history, read_pressures, read_response
 from coupling.datasets.geometry import on_tunnel
-from coupling.files.provenance import origin, with_history
+from coupling.files.provenance import made_here
 from coupling.refused import Refused
 from coupling.responses.comparison import largest_difference
 from coupling.scenes.scene import parse_scene
@@ -51,8 +51,7 @@ class SideBySide(NamedTuple):
             states, dim=names, join="outer", data_vars="all", coords="minimal", compat="override",
             combine_attrs="drop_conflicts",
         )  # fmt: skip
-        about = {"title": f"{TITLE}: {', '.join(names.values)}", "history": with_history("", "runs compared")}
-        return whole.assign_attrs(origin() | about, Conventions="CF-1.11")
+        return whole.assign_attrs(made_here(f"{TITLE}: {', '.join(names.values)}", "runs compared"))
 
 
 def side_by_side(runs: Sequence[str | Path], along: str = "inflow_mass", records: int = 41) -> SideBySide:

@@ -57,10 +57,12 @@ def test_inflow_rate_of_a_straight_line_has_no_error():
 
 
 def test_quality_of_triangles():
-    x, y = np.array([0.0, 1.0, 0.5, 1.0]), np.array([0.0, 0.0, np.sqrt(0.75), 1.0])
-    altitude, angle = ground.triangle_quality(x, y, np.array([[0, 1, 2], [0, 1, 3]]))
-    np.testing.assert_allclose(altitude, [np.sqrt(0.75), np.sqrt(0.5)])
-    np.testing.assert_allclose(angle, [60.0, 45.0])
+    mesh = xr.Dataset({
+        "x": ("node", [0.0, 1.0, 0.5, 1.0]), "y": ("node", [0.0, 0.0, np.sqrt(0.75), 1.0]),
+        "element_nodes": (("element", "corner"), [[0, 1, 2], [0, 1, 3]]), "region": ("element", [0, 0]),
+    })  # fmt: skip
+    shown = ground.mesh_picture(mesh)
+    assert shown["min_altitude"] == pytest.approx(np.sqrt(0.5)) and shown["min_angle"] == pytest.approx(45.0)
 
 
 def test_initial_theory_is_given_only_where_it_holds(quick_scene):

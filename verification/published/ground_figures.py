@@ -11,6 +11,7 @@ from coupling.figures import GATE, INITIAL, NOW, SECOND
 from coupling.figures.ground import FIELD_COLOURS, frame_view
 from coupling.figures.picture import styled
 from coupling.figures.tunnel import draw_linings
+from coupling.postprocess.elements import cell_means
 
 #: Displacements that bound the flow zone and the disturbed zone [mm].
 ZONES = (50.0, 10.0)
@@ -128,9 +129,7 @@ def _draw_field(axis, mesh, values, colours, norm):
     shown = (mesh["region"].values == 0) & np.isfinite(values)
     area = postprocess.element_areas(mesh)[shown]
     corners = nodes[shown]
-    total = sum(np.bincount(corners[:, k], area, count) for k in range(3))
-    summed = sum(np.bincount(corners[:, k], area * values[shown], count) for k in range(3))
-    nodal = np.where(total > 0, summed / np.where(total > 0, total, 1.0), 0.0)
+    nodal = np.nan_to_num(cell_means(corners.ravel(), np.repeat(area, 3), np.repeat(values[shown], 3), count))
     triangles = Triangulation(mesh["x"].values, mesh["y"].values, corners)
     clipped = np.clip(nodal, norm.vmin, None) if isinstance(norm, LogNorm) else nodal
     drawn = axis.tripcolor(triangles, clipped, cmap=colours, norm=norm, shading="gouraud", rasterized=True)

@@ -10,6 +10,7 @@ import numpy as np
 
 from coupling import postprocess
 from coupling.refused import SceneError
+from verification.pages import table
 from verification.published.bands import judged
 from verification.published.draw import CAPTIONS, draw_bands, draw_case, draw_cases, draw_twin
 from verification.published.evidence import RunEvidence, at_rest, provenance
@@ -254,8 +255,8 @@ def _markdown(head, rows):
     """Lines of a table; bars inside its cells, as of |Q|, are escaped."""
     if not rows:
         return ["Not run."]
-    lines = ["| " + " | ".join(re.sub(r"(?<!\\)\|", "\\|", cell) for cell in row) + " |" for row in (head, *rows)]
-    return [lines[0], "|---" * len(head) + "|", *lines[1:]]
+    head, *rows = [[re.sub(r"(?<!\\)\|", "\\|", cell) for cell in row] for row in (head, *rows)]
+    return table(head, rows)
 
 
 def _word(agrees):
