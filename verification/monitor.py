@@ -16,10 +16,7 @@ SOLID, LIQUID = (tuple(f"velocity_{phase}_{axis}" for axis in "xy") for phase in
 class Monitor:
     """Sums over the steps of a solver what must balance.
 
-    Parameters
-    ----------
-    solver : mpm.solver.Solver
-        In its initial state.
+    solver : mpm.solver.Solver, in its initial state.
     """
 
     def __init__(self, solver):

@@ -19,17 +19,10 @@ DOCS = Path(__file__).resolve().parent.parent / "docs"
 class Page:
     """A page with generated blocks, each from `<!-- NAME -->` to `<!-- end of NAME -->`; the rest is written by hand.
 
-    Parameters
-    ----------
-    path : path
-    title : str
-        Heading of a page that is not there yet; it begins as the heading and all blocks, in their order.
-    blocks : sequence of str
+    path : path;  title : str, heading of a page that is not there yet; it begins as the heading and all blocks, in
+    their order;  blocks : sequence of str.
 
-    Raises
-    ------
-    coupling.refused.Refused
-        The page is there and lacks a block: before the work that would fill it.
+    Raises coupling.refused.Refused: the page is there and lacks a block: before the work that would fill it.
     """
 
     def __init__(self, path, title, blocks):

@@ -18,10 +18,7 @@ class EventStream:
     wrong "refused", "failed" or "interrupted" (message, exit_code). A reader that goes away stops the
     lines, not the run.
 
-    Parameters
-    ----------
-    path : path or None
-        "-" prints; None writes nothing.
+    path : path or None, "-" prints; None writes nothing.
     """
 
     def __init__(self, path):

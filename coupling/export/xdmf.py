@@ -16,10 +16,7 @@ KINDS = {1: "Scalar", 3: "Vector", 9: "Tensor"}  # by numbers a place
 class XdmfSeries:
     """Writes one grid a time; the XML is complete after leaving the context.
 
-    Parameters
-    ----------
-    path : str or path
-        Ends in .xdmf; the HDF5 file beside it ends in .h5.
+    path : str or path, ends in .xdmf; the HDF5 file beside it ends in .h5.
     """
 
     def __init__(self, path):

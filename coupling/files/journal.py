@@ -24,13 +24,8 @@ DIGEST = hashlib.sha256().digest_size
 class Overlay(io.RawIOBase):
     """A file as it would be with some of its pages changed; the file itself is only read.
 
-    Parameters
-    ----------
-    path : path
-    pages : dict of int to bytearray, optional
-        Changed pages by number.
-    size : int, optional
-        Size of the changed file [bytes].
+    path : path;  pages : dict of int to bytearray, optional, changed pages by number;  size : int, optional, size of
+    the changed file [bytes].
     """
 
     def __init__(self, path, pages=None, size=None):

@@ -57,7 +57,6 @@ def collect(folder, beside, model=None):
     chosen = [drawn[k] for k in evenly(len(drawn), MOST_CASES)] if drawn else []
     player, notes = _player(whole, answers, chosen, plan.records)
     attributes = next(iter(whole.values())).attrs if whole else {}
-    limits = _found_limits(done, whole, models[0] if models else None)
     if len(chosen) < len(drawn):
         notes.insert(0, f"Charts hold {len(chosen)} of {len(drawn)} finished cases, evenly chosen; tables hold all.")
     return {
@@ -66,20 +65,13 @@ def collect(folder, beside, model=None):
                 f"in {duration(sum(row['cpu_seconds'] or 0.0 for row in done))} of processor time.",
         "status": ("finished" if not lost else "failed" if not done else "partly",
                    f"{len(done)} of {len(rows)} finished"),
-        "warnings": _warnings(rows, lost),
         "notes": notes,
-        "answer": _answer(done, limits),
         "attributes": attributes,
         "made": f"first case of {attributes['created']}" if "created" in attributes else "",
         "design_title": "Design of the study",
         "design": _design(plan, found, len(done), sum(row["status"] == "failed" for row in lost)),
-        "scene_of_cases": _shared_facts(found),
-        "lost": lost,
-        "done": done,
-        "table": _table(done),
-        "limits": _limits(done, limits, models[0] if models else None),
-        "trust": _trust(done),
         "player": player,
+        **_of_cases(found, rows, whole, models[0] if models else None),
     }  # fmt: skip
 
 
@@ -100,25 +92,33 @@ def collect_runs(compared, beside):
     design = [(case.parameters["run"], str(file)) for case, file in zip(compared.cases, compared.files, strict=True)]
     last = f"{shown(float(whole[0][along][-1]))} {unit}"
     model = str(whole[0]["model"].values[0]) if "model" in whole[0].dims else None
-    limits = _found_limits(done, whole, model)
     return {
         "title": f"Gushing into a tunnel: {len(done)} runs side by side",
         "lead": f"Compared at equal {place}, to {last}, which all of them reached.",
         "status": ("finished", f"{len(done)} runs"),
-        "warnings": _warnings(done, []),
         "notes": notes,
-        "answer": _answer(done, limits, compared.rows),
         "attributes": whole[0].attrs,
         "made": f"first run of {whole[0].attrs.get('created', 'unknown time')}",
         "design_title": "What is compared",
         "design": [*design, ("compared at", f"{records} {places}")],
-        "scene_of_cases": _shared_facts(compared.cases),
-        "lost": [],
+        "player": player,
+        **_of_cases(compared.cases, done, whole, model, compared.rows),
+    }
+
+
+def _of_cases(found, rows, whole, model, differences=()):
+    """What a page says of its cases, whether they are those of a study or runs side by side."""
+    done, lost = ([row for row in rows if (row["status"] == "finished") == good] for good in (True, False))
+    limits = limits_of_study({row["number"]: limits_of_case(whole[row["number"]], model) for row in done})
+    return {
+        "warnings": _warnings(rows, lost),
+        "answer": _answer(done, limits, differences),
+        "scene_of_cases": _shared_facts(found),
+        "lost": lost,
         "done": done,
         "table": _table(done),
         "limits": _limits(done, limits, model),
         "trust": _trust(done),
-        "player": player,
     }
 
 
@@ -253,10 +253,6 @@ def _span(done):
             (least, of_least, number), (most, of_most, _) = (pick(found, key=lambda one: one[0]) for pick in (min, max))
             rows.append((f"{number.label} [{number.unit}]", shown(least), of_least, shown(most), of_most))
     return rows
-
-
-def _found_limits(done, whole, model):
-    return limits_of_study({row["number"]: limits_of_case(whole[row["number"]], model) for row in done})
 
 
 def _limits(done, found, model):

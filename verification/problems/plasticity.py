@@ -23,14 +23,9 @@ def timed(work):
 class Element:
     """One piece of soil that the return mapping of `mpm` strains step by step.
 
-    Parameters
-    ----------
-    cohesion, friction_angle, dilatancy_angle, tensile_strength : float
-        [Pa], [deg], [deg], [Pa]
-    rotation : float
-        Angle from the mesh's to the principal axes in the plane [deg].
-    relaxation : tuple of two floats
-        Relaxation time and time step [s].
+    cohesion, friction_angle, dilatancy_angle, tensile_strength : float [Pa], [deg], [deg], [Pa];
+    rotation : float, angle from the mesh's to the principal axes in the plane [deg];
+    relaxation : tuple of two floats, relaxation time and time step [s].
     """
 
     def __init__(

@@ -23,10 +23,7 @@ CLAY = {
 class Piece:
     """A piece of soil under an isotropic stress, and what its law makes of strains.
 
-    Parameters
-    ----------
-    settings
-        Keys of the soil; those of a cohesionless sand where they are left out.
+    settings : keys of the soil; those of a cohesionless sand where they are left out.
     """
 
     def __init__(self, **settings):

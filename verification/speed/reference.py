@@ -27,9 +27,7 @@ def copy_bandwidth(megabytes=256, rounds=3):
 class ReferenceLoop:
     """A block of fluid falling in a box, four points a cell.
 
-    Parameters
-    ----------
-    n_points : int
+    n_points : int.
     """
 
     def __init__(self, n_points):

@@ -13,16 +13,8 @@ from verification.stability.trials import collapse, filled_tunnel, gate, jet, on
 class Case:
     """One extreme.
 
-    Parameters
-    ----------
-    name : str
-    title : str
-        What is extreme about it.
-    run : callable
-        run(**settings) -> (faults, measures), of `verification.monitor.Monitor`.
-    settings : dict
-    representative : bool
-        One of those that the tests run.
+    name : str;  title : str, what is extreme about it;  run : callable, run(**settings) -> (faults, measures), of
+    `verification.monitor.Monitor`;  settings : dict;  representative : bool, one of those that the tests run.
     """
 
     name: str
