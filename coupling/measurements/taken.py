@@ -10,7 +10,7 @@ from coupling.datasets.geometry import has_tunnels, tunnel_list
 from coupling.datasets.open_run import Run
 from coupling.measurements.measurement import Measurement
 from coupling.measurements.quantities import QUANTITIES, computed
-from coupling.postprocess.inflow import by_inflow
+from coupling.postprocess.inflow import crossing_times
 from coupling.refused import Refused
 
 #: A time that is past the last record by no more than this share of it is that of the record.
@@ -61,13 +61,9 @@ def at_measurements(
 
 def _times(given, history):
     """When each was measured by the run's clock [s], (n,) float64; NaN where the run did not get there."""
-    over = by_inflow(history)
-    masses, crossings = over["inflow_mass"].values, over["time"].values
-    times = [
-        one.time if one.time is not None else np.interp(one.inflow_mass, masses, crossings, right=np.nan)
-        for one in given
-    ]
-    return np.array(times, float)
+    masses = np.array([one.inflow_mass for one in given], float)
+    crossings = crossing_times(history["inflow_mass"].values, history["time"].values, masses)
+    return np.where(np.isnan(masses), np.array([one.time for one in given], float), crossings)
 
 
 def _taken(field: xr.DataArray, given: list[Measurement], times: NDArray[np.float64]) -> NDArray[np.float64]:

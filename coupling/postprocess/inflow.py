@@ -4,6 +4,23 @@ from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+
+def crossing_times(
+    inflow_mass: NDArray[np.float64], time: NDArray[np.float64], masses: ArrayLike
+) -> NDArray[np.float64]:
+    """Times at which masses were first reached, linear between the records around them; NaN for those that were not.
+
+    inflow_mass, time : of the records, (k,) [kg/m], [s];  masses : (n,) [kg/m].
+    """
+    masses, highest = np.asarray(masses, float), np.maximum.accumulate(inflow_mass)
+    after = np.minimum(np.searchsorted(highest, masses * (1 - 1e-12)), len(time) - 1)
+    before = np.maximum(after - 1, 0)
+    width = highest[after] - highest[before]
+    share = np.minimum((masses - highest[before]) / np.where(width > 0, width, 1.0), 1.0)
+    times = time[before] + share * (time[after] - time[before])
+    return np.where(masses <= highest[-1] * (1 + 1e-12), times, np.nan)
 
 
 def at_inflow(dataset: xr.Dataset, inflow_mass: float) -> xr.Dataset:
@@ -33,18 +50,13 @@ def at_inflow(dataset: xr.Dataset, inflow_mass: float) -> xr.Dataset:
     >>> at_inflow(run, 10.0).time.item()
     0.5
     """
-    mass = dataset["inflow_mass"].values
-    reached = np.flatnonzero(mass >= inflow_mass)
-    if not reached.size:
+    mass, times = dataset["inflow_mass"].values, dataset["time"].values
+    (time,) = crossing_times(mass, times, [inflow_mass])
+    if np.isnan(time):
         raise ValueError(
             f"inflow_mass: {inflow_mass:g} kg/m was not reached, the run ends at {mass[-1]:.4g} kg/m; ask for less"
         )
-    after = int(reached[0])
-    if after == 0:
-        return dataset.isel(time=0)
-    share = (inflow_mass - mass[after - 1]) / (mass[after] - mass[after - 1])
-    time = dataset["time"].values
-    return dataset.interp(time=time[after - 1] + share * (time[after] - time[after - 1]), assume_sorted=True)
+    return dataset.isel(time=0) if time == times[0] else dataset.interp(time=time, assume_sorted=True)
 
 
 def by_inflow(dataset: xr.Dataset) -> xr.Dataset:

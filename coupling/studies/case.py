@@ -84,10 +84,11 @@ def at_inflow_masses(pressures, history, responses, masses, along="inflow_mass")
     import xarray as xr
 
     from coupling.datasets import BALANCES
+    from coupling.postprocess.inflow import crossing_times
     from coupling.postprocess.quality import quality
     from structure.limits import CHECK_VARIABLES
 
-    reached, unique = _times(history[along].values, history["time"].values, masses)
+    reached = crossing_times(history[along].values, history["time"].values, masses)
     parts = [_at(pressures[["soil_pressure", "water_pressure", "soil_shear"]], reached)]
     parts.append(_at(history[[name for name in PROGRESS if name != "time" and name in history]], reached))
     if responses:
@@ -105,7 +106,7 @@ def at_inflow_masses(pressures, history, responses, masses, along="inflow_mass")
         inflow_mass=("progress", mass, {"units": "kg/m", "long_name": "grains inside the tunnel"}),
     )
     about = {"units": "s", "long_name": "time since the gate opened"}
-    result["time"] = ("progress", np.where(unique, reached, np.nan), about)
+    result["time"] = ("progress", reached, about)
     used = float(history["cpu_seconds"].values[-1])
     result["cpu_seconds"] = ((), used, {"units": "s", "long_name": "processor time"})
     values = quality(history, next(iter(responses.values()), None)) if set(BALANCES) <= set(history) else {}
@@ -128,21 +129,6 @@ def _limits(response):
         about = {"units": "kg/m", "long_name": f"inflow mass at which the utilisation passes 1, {what}"}
         found[f"{name}_passing_mass"] = ((), passing, about)
     return found
-
-
-def _times(inflow, time, masses):
-    """Time at which each inflow mass was first reached, and whether it was."""
-    highest = np.maximum.accumulate(inflow)
-    known = masses <= highest[-1] * (1 + 1e-12)
-    reached = np.empty(len(masses))
-    for k, mass in enumerate(masses):
-        after = int(np.argmax(highest >= mass * (1 - 1e-12))) if known[k] else len(time) - 1
-        if after == 0 or not known[k]:
-            reached[k] = time[after]
-            continue
-        share = (mass - highest[after - 1]) / max(highest[after] - highest[after - 1], 1e-300)
-        reached[k] = time[after - 1] + min(share, 1.0) * (time[after] - time[after - 1])
-    return np.where(known, reached, np.nan), known
 
 
 def _at(dataset, times):

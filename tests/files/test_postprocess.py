@@ -8,6 +8,7 @@ import coupling
 import mpm
 import mpm.scene
 from coupling import postprocess
+from coupling.postprocess.inflow import crossing_times
 
 pytestmark = pytest.mark.slow
 
@@ -25,6 +26,11 @@ def test_state_at_an_inflow_mass_lies_on_the_line_between_its_records():
 def test_an_inflow_mass_that_was_not_reached_is_refused():
     with pytest.raises(ValueError, match=r"99 kg/m was not reached, the run ends at 50 kg/m"):
         postprocess.at_inflow(history([0.0, 1.0], [0.0, 50.0]), 99.0)
+
+
+def test_a_mass_beyond_a_pause_of_the_inflow_is_reached_after_it():
+    time, mass = np.array([0.0, 1.0, 5.0, 6.0]), np.array([0.0, 10.0, 10.0, 20.0])
+    np.testing.assert_allclose(crossing_times(mass, time, [0.0, 10.0, 15.0, 30.0]), [0.0, 1.0, 5.5, np.nan])
 
 
 def test_straight_line_has_full_linearity_and_a_parabola_has_not():
