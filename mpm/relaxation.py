@@ -181,9 +181,9 @@ def relax(solver, friction, tolerance, max_steps, progress=None):
         residual = float(np.sqrt(unbalanced / total)) if unbalanced > 0.0 else 0.0  # no weight at all: 0 / 0
         if progress is not None and step % 50 == 0:
             progress(step, residual)
-        if residual < tolerance:
+        if residual < tolerance and (s.moving is None or last_energy == 0.0):  # rings balance from rest
             break
-        if energy < last_energy:
+        if energy < last_energy or residual < tolerance:
             velocity[:] = 0.0
             energy = 0.0
             if s.moving is not None:

@@ -16,6 +16,8 @@ from structure.ring import Ring
 #: Share of the stiffness of joint or segment, whichever is less, kept in the *tangent* only of a joint that is open,
 #: sliding or nearly hinged: the ring stays factorisable, and convergence slows by no more than this factor a step.
 TANGENT_FLOOR = 1e-6
+#: Of Newton's method for a rotation, and the relative change at which it stops.
+MAX_STEPS, CLOSE = 60, 1e-8
 #: Points of a face where a joint touches along it.
 FACE_POINTS = 40
 
@@ -90,6 +92,27 @@ def contact_moment(
     by_rotation = np.where(gaping, stiffness * share**3, stiffness)
     by_axial_force = np.where(gaping & (axial_force > 0), edge * (1 - share), 0.0)
     return moment, by_rotation, by_axial_force
+
+
+def gaping_rotation(
+    both: np.ndarray, compression: np.ndarray, stiffness: np.ndarray, height: np.ndarray, around: np.ndarray
+) -> np.ndarray:
+    """Rotation at which the moment of :func:`contact_moment` plus `around` times the rotation is `both`; all (n,).
+
+    For joints that gape there, of others at least the decompressed one. With q = sqrt(phi_d/phi), 0 < q <= 1, the root
+    of N h/2 (1 - 2 q/3) + around phi_d/q^2 = both, convex and falling in q, by Newton's method from its left.
+    """
+    decompression, edge = compression * height / (6 * stiffness), compression * height / 2
+    alone, wide = both / around, decompression > 0
+    most = np.where(wide, decompression, 1.0)
+    share = np.minimum(np.sqrt(most / np.where(wide, np.maximum(alone, most), 1.0)), 1.0)
+    for _ in range(MAX_STEPS):
+        left = edge * (1 - 2 / 3 * share) + around * most / share**2 - both
+        longer = np.clip(share + left / (2 / 3 * edge + 2 * around * most / share**3), share, 1.0)
+        share, change = longer, longer - share
+        if np.all(change <= CLOSE * share):
+            break
+    return np.where(wide, most / share**2, alone)
 
 
 def limited_shear(
@@ -201,6 +224,24 @@ class JointLaw:
         tangent[..., 2, 2] = np.maximum(by_rotation, self.floors[:, 2])
         return JointForces(np.stack([-axial, shear, moment], axis=-1), tangent, slip)
 
+    def between(self, both: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
+        """Movements (n_joints, 3) at which forces plus `stiffness` times movements are `both`, of unslipped joints."""
+        opening, dislocation, rotation = (both / (self.springs + stiffness)).T
+        around, beside, about = stiffness.T
+        if self.contact_only:
+            opening = np.where(opening > 0, both[:, 0] / around, opening)
+        compression = np.maximum(-self.normal * opening, 0.0)
+        if self.friction is not None:
+            limit, trial = self.friction * compression, self.shear * dislocation
+            sliding = np.abs(trial) > limit
+            dislocation = np.where(sliding, (both[:, 1] - np.clip(trial, -limit, limit)) / beside, dislocation)
+        if self.height is not None:
+            gaping = np.abs(rotation) > compression * self.height / (6 * self.rotation)
+            if gaping.any():
+                turned = gaping_rotation(np.abs(both[:, 2]), compression, self.rotation, self.height, about)
+                rotation = np.where(gaping, np.sign(rotation) * turned, rotation)
+        return np.stack([opening, dislocation, rotation], axis=-1)
+
     def states(self, moved: np.ndarray, forces: JointForces) -> list[str]:
         """What each joint does, in words, from its movements (n_joints, 3) and forces."""
         compression = np.maximum(forces.axial, 0.0)
@@ -299,6 +340,13 @@ class BoltLaw(NamedTuple):
         """Force [N/m] and its derivative [N/m2] at elongations (..., n_joints) [m]."""
         force = self.preload + self.stiffness * (elongation - self.slack)
         return np.maximum(force, 0.0), np.where(force > 0, self.stiffness, TANGENT_FLOOR * self.stiffness)
+
+    def between(self, both: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
+        """Elongations (n_joints,) [m] at which pull plus `stiffness` times elongation is `both`."""
+        loose = both / stiffness
+        pulls = self.preload + self.stiffness * (loose - self.slack) > 0
+        tight = (both - self.preload + self.stiffness * self.slack) / (self.stiffness + stiffness)
+        return np.where(pulls, tight, loose)
 
 
 def bolt_law(ring: Ring) -> BoltLaw:

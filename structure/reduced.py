@@ -16,6 +16,7 @@ from scipy.sparse.linalg import splu
 from structure.discrete import DiscreteLining
 from structure.inputs import InputError
 from structure.lining import THETA
+from structure.newton import NoEquilibrium
 from structure.ring import Ring
 from structure.ring_forces import springs_at
 
@@ -23,6 +24,9 @@ from structure.ring_forces import springs_at
 FACE = np.radians(np.arange(0, 360, 0.5))
 #: Share of the largest eigenvalue of their scalar products below which answers count as combinations of the others.
 DEPENDENT = 1e-12
+#: Of Newton's method for the joints alone; smallest part of a step; the roundings of the terms of a sum of forces at
+#: which it stops.
+MAX_ITERATIONS, SMALLEST_SHARE, ROUNDINGS, EPSILON = 100, 1e-3, 16, np.finfo(float).eps
 
 
 def check_movable(ring: Ring) -> None:
@@ -61,8 +65,9 @@ class ReducedRing:
         [N/m]
     jumps : (n_joints, 3, m) float64
         Opening [m], dislocation [m] and rotation [rad] of the joints.
-    joints_linear : bool
-        Whether the stiffness contains the joints and there are no bolts; else :meth:`joint_forces` gives what they add.
+    moves : (n, m) float64
+        What joints whose forces the stiffness does not contain feel: none where they are linear and have no bolts, else
+        opening, dislocation and rotation of one joint after the other, then the elongations of their bolts.
     """
 
     def __init__(self, lining: DiscreteLining, density: float, gravity: float, n_harmonics: int = 8):
@@ -70,7 +75,7 @@ class ReducedRing:
         self.outer_radius, self.radius = ring.outer_radius, ring.centre_radius
         check_movable(ring)
         self.law, self.bolt_law = parts.law, parts.bolt_law
-        self.joints_linear = self.law.linear and self.bolt_law is None
+        linear = self.law.linear and self.bolt_law is None
         mass, rigid = density * parts.mass, parts.rigid.T
         deformed = _orthonormal(_answers(lining, mass, rigid, n_harmonics), mass)
         deformed *= np.sqrt(mass_of_ring := float(rigid[:, 0] @ (mass @ rigid[:, 0])))
@@ -79,15 +84,15 @@ class ReducedRing:
         self.mass[:3, :3] = rigid.T @ (mass @ rigid)
         np.fill_diagonal(self.mass[3:, 3:], mass_of_ring)
         self.weight = -gravity * (self.basis.T @ (mass @ rigid[:, 1]))
-        held = parts.linear if self.joints_linear else parts.body
+        held = parts.linear if linear else parts.body
         self.stiffness = np.zeros_like(self.mass)
         self.stiffness[3:, 3:] = deformed.T @ (held @ deformed)
         jumps = parts.jumps @ self.basis
         jumps[:, :3] = 0.0
         self.jumps = jumps.reshape(-1, 3, self.basis.shape[1])
-        if parts.bolts is not None:
-            self.elongation = parts.bolts @ self.basis
-            self.elongation[:, :3] = 0.0
+        moves = [jumps] if parts.bolts is None else [jumps, parts.bolts @ self.basis]
+        self.moves = np.vstack([jumps[:0]] if linear else moves)
+        self.moves[:, :3] = 0.0
         self._bolt_shares = lining.readings.bolt_shares
         self._readings = [part @ self.basis for part in lining.readings.forces]
         arc = self.outer_radius * FACE[1]
@@ -121,35 +126,84 @@ class ReducedRing:
         second = (first + 1) % len(FACE)
         return tuple((1 - share) * part[first] + share * part[second] for part in (self._outward, self._clockwise))
 
-    def joint_forces(self, displacement: np.ndarray, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Forces that hold the joints as they are, on the coordinates, where their law is not linear, and their bolts.
+    def joint_forces(self, moved: np.ndarray, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Forces that joints and bolts resist with, their tangent, and the slips then: (n,), (n, n), (n_joints,).
 
         Parameters
         ----------
-        displacement : (m,) float64
-            [m]
+        moved : (n,) float64
+            Of `moves`.
+        slip : (n_joints,) float64
+            Irreversible dislocations before [m].
+        """
+        ways, joint = 3 * self.law.count, np.arange(self.law.count)
+        resisting, tangents, slip = self.law.forces(moved[:ways].reshape(-1, 3), slip)
+        force, tangent = np.zeros(len(moved)), np.zeros((len(moved),) * 2)
+        force[:ways] = resisting.ravel()
+        tangent[:ways, :ways].reshape(-1, 3, self.law.count, 3)[joint, :, joint] = tangents
+        if self.bolt_law is not None:
+            force[ways:], tangent[range(ways, len(moved)), range(ways, len(moved))] = self.bolt_law.pull(moved[ways:])
+        return force, tangent, slip
+
+    def joints_between(
+        self, flexibility: np.ndarray, free: np.ndarray, start: np.ndarray, slip: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Forces of joints and bolts between surroundings that answer to them linearly, by Newton's method.
+
+        Its unknowns are forces plus movements times the stiffness of the surroundings: of these the movement is a
+        smooth enough function however stiff a joint is, and one that sticks can be told from one that slides the other
+        way. Sources: Alart & Curnier (1991), Comput. Methods Appl. Mech. Eng. 92, 353; Hintermueller, Ito & Kunisch
+        (2003), SIAM J. Optim. 13, 865.
+
+        Parameters
+        ----------
+        flexibility : (n, n) float64
+            By how much `moves` are less per force of each.
+        free : (n,) float64
+            What they are without these forces.
+        start : (n,) float64
+            Near to what they are.
         slip : (n_joints,) float64
             Irreversible dislocations before [m].
 
         Returns
         -------
-        force, tangent, slip : (m,), (m, m), (n_joints,) float64
+        force, slip : (n,), (n_joints,) float64
+
+        Raises
+        ------
+        structure.newton.NoEquilibrium
         """
-        resisting, tangents, slip = self.law.forces(self.jumps @ displacement, slip)
-        force = np.einsum("jkm,jk->m", self.jumps, resisting)
-        tangent = np.einsum("jkm,jkn->mn", self.jumps, tangents @ self.jumps)
-        if self.bolt_law is not None:
-            pull, stiffening = self.bolt_law.pull(self.elongation @ displacement)
-            force += self.elongation.T @ pull
-            tangent += self.elongation.T @ (stiffening[:, None] * self.elongation)
-        return force, tangent, slip
+        ways, unslipped, beyond = 3 * self.law.count, np.zeros_like(slip), np.zeros_like(free)
+        beyond[1:ways:3] = slip  # forces follow what is beyond the slip: its size brings no rounding
+        free, moved, around = free - beyond, start - beyond, np.linalg.inv(flexibility)
+        stiffness, magnitudes = around.diagonal(), np.abs(around)
+        least, share, step, both = np.inf, 1.0, np.zeros_like(free), np.zeros_like(free)
+        for _ in range(MAX_ITERATIONS):
+            force, tangent, more = self.joint_forces(moved, unslipped)
+            left = around @ (free - moved) - force
+            terms = magnitudes @ (np.abs(free) + np.abs(moved)) + np.abs(tangent) @ np.abs(moved) + np.abs(force)
+            if np.all(np.abs(left) <= ROUNDINGS * EPSILON * terms):
+                return force, slip + more
+            missed = np.sum(left**2 / stiffness)
+            if missed < least or share < SMALLEST_SHARE:
+                change = np.linalg.solve(around + tangent, left)
+                both, step = force + stiffness * moved, stiffness * change + tangent @ change
+                least, share = missed, 1.0
+            else:  # joints that turn or slide back and forth: half the way
+                share *= 0.5
+            tried, moved = both + share * step, np.empty_like(free)
+            moved[:ways] = self.law.between(tried[:ways].reshape(-1, 3), stiffness[:ways].reshape(-1, 3)).ravel()
+            if self.bolt_law is not None:
+                moved[ways:] = self.bolt_law.between(tried[ways:], stiffness[ways:])
+        raise NoEquilibrium(f"joints are {np.abs(left).max():.3g} N/m out of balance after {MAX_ITERATIONS} iterations")
 
     def internal_forces(self, displacement: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """N, Q [N/m] and M [N m/m] at theta [rad], (n,) float64 each; signs: `structure.response`."""
         around = np.degrees(theta)
         forces = [part @ displacement for part in self._readings]
         if self._bolt_shares is not None:
-            pull, _ = self.bolt_law.pull(self.elongation @ displacement)
+            pull, _ = self.bolt_law.pull(self.moves[3 * self.law.count :] @ displacement)
             forces = [force + share @ pull for force, share in zip(forces, self._bolt_shares, strict=True)]
         return tuple(np.interp(around, THETA, force, period=360.0) for force in forces)
 

@@ -6,8 +6,10 @@ equations of `mpm.walls.contact`, seen from the wall), and the ring's velocity u
     F(u) = A (u - u0) - dt (weight - K x) + sum over nodes of G^T dt R(G u),   A = M + dt^2/4 K,
 with G the velocity of a node per coordinate of the ring. The reactions are piecewise linear in u, so Newton's method
 ends after as many iterations as contacts change their state in a step, mostly one. Joints that open, gape or slide add
-s(x + dt/4 (u - u0)) dt, which is linearised around the last solution until that is exact. What is left is taken into
-the next step: momentum is conserved whatever happens.
+dt J^T s(J (x + dt u)), J what they feel of the coordinates: with the reactions linearised, all around the
+joints is a linear answer to their forces s, between which the ring finds them exactly, however stiff they are. These
+act as at the end of the step (Euler backward): in its mean, as all else, joints that close would gain energy. What is
+left is taken into the next step: momentum is conserved whatever happens.
 """
 
 from functools import cache
@@ -19,12 +21,9 @@ from mpm.fields import record, values
 from mpm.machine.compile import kernel, kernel_part
 from mpm.step.nodes import free_kernel, moved, sum_kernel, velocities_of
 from mpm.walls.contact import Masses, Pair, response_kernel
-from mpm.walls.rings import BETA, ElasticRing, RigidRing, effective_mass
+from mpm.walls.rings import ElasticRing, RigidRing, effective_mass
 
 MAX_ITERATIONS = 100
-MAX_JOINT_ITERATIONS = 50
-MOST_MISSED = 1e-3  # of the force of joints at which a step may end, for the next one to make up
-ROUNDINGS = 16  # of the largest term of a joint's force, that no residual gets below
 SMALLEST_SHARE = 1e-3  # of Newton's step
 TOLERANCE = 1e-11  # of the largest term of an equation: round-off of its sum
 
@@ -81,77 +80,45 @@ def reaction_kernel(wet):
 
 @kernel
 def solve_dense(matrix, right):
-    """Solve matrix x = right by elimination with partial pivoting, in place; the solution replaces `right`.
+    """Solve matrix x = right, (m, m) and (m, n), by elimination with partial pivoting, in place; the solutions replace
+    `right`.
 
     LAPACK's bits may depend on its threads.
     """
-    n = right.size
+    n, columns = right.shape
     for k in range(n):
         pivot = k
         for i in range(k + 1, n):
             if abs(matrix[i, k]) > abs(matrix[pivot, k]):
                 pivot = i
         if pivot != k:
-            for j in range(n):
+            for j in range(k, n):
                 matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
-            right[k], right[pivot] = right[pivot], right[k]
+            for j in range(columns):
+                right[k, j], right[pivot, j] = right[pivot, j], right[k, j]
         for i in range(k + 1, n):
             factor = matrix[i, k] / matrix[k, k]
             if factor != 0.0:
                 for j in range(k + 1, n):
                     matrix[i, j] -= factor * matrix[k, j]
-                right[i] -= factor * right[k]
+                for j in range(columns):
+                    right[i, j] -= factor * right[k, j]
     for k in range(n - 1, -1, -1):
-        for j in range(k + 1, n):
-            right[k] -= matrix[k, j] * right[j]
-        right[k] /= matrix[k, k]
+        for i in range(k + 1, n):
+            for j in range(columns):
+                right[k, j] -= matrix[k, i] * right[i, j]
+        for j in range(columns):
+            right[k, j] /= matrix[k, k]
 
 
 @cache
-def node_kernel(wet):
-    """Kernel `add_node` for soil with pore water or without."""
+def balance_kernel(wet):
+    """Kernel `find_balance` for soil with pore water or without."""
     react = reaction_kernel(wet)
 
-    @kernel_part
-    def add_node(node, c, g, contact, velocity, wall, along, across, matrix, residual, scale):
-        """Add the reaction of a node to the ring's balance, its derivatives and its size; set the wall's velocity.
-
-        node : record of `gather`;  c : row of `contact` and `wall`;  g : (2, m) float64 of `motion`
-        along, across : (m,) float64, scratch.
-        """
-        m = velocity.size
-        ux = uy = 0.0
-        for j in range(m):
-            ux += g[0, j] * velocity[j]
-            uy += g[1, j] * velocity[j]
-        wall[c, 0], wall[c, 1] = ux, uy
-        if contact[c].active <= 0.0 or node.solid <= 0.0:
-            return
-        nx, ny = contact[c].normal_x, contact[c].normal_y
-        push, shear, push_n, shear_n, shear_t = react(node, contact[c], ux, uy)
-        if push == 0.0:
-            return
-        for j in range(m):
-            along[j], across[j] = nx * g[0, j] + ny * g[1, j], ny * g[0, j] - nx * g[1, j]
-        for i in range(m):
-            felt = along[i] * push + across[i] * shear
-            residual[i] += felt
-            scale[i] += abs(felt)
-            by_n, by_t = along[i] * push_n + across[i] * shear_n, across[i] * shear_t
-            for j in range(m):
-                matrix[i, j] += by_n * along[j] + by_t * across[j]
-
-    return add_node
-
-
-@cache
-def velocity_kernel(wet):
-    """Kernel `find_velocity` for soil with pore water or without."""
-    add_node = node_kernel(wet)
-
     @kernel
-    def find_velocity(state, rows, motion, contact, effective_mass, due, velocity, left, wall):
-        """Velocity of the ring and of the wall at its nodes, in place, by Newton's method.
+    def find_balance(state, rows, motion, contact, mass, impulse, before, velocity, wall, balance, matrix):
+        """Sum of all impulses on a ring, but of joints, that would give it a velocity, and its derivatives.
 
         Parameters
         ----------
@@ -161,56 +128,61 @@ def velocity_kernel(wet):
             Rows of `contact` and `wall`.
         motion : (k, 2, m) float64
             Velocity of the nodes per coordinate.
-        effective_mass, due : (m, m), (m,) float64
-            A [kg/m] and the impulse on the ring without reactions [N s/m].
-        velocity, left : (m,) float64
-            u [m/s]; the impulse that earlier steps left, then that of this one [N s/m].
+        mass : (m, m) float64
+            [kg/m]
+        impulse : (2, m) float64
+            What is left of earlier steps, and without reactions [N s/m].
+        before, velocity : (m,) float64
+            [m/s]
         wall : (n_contact, 2) float64
-            Written at `rows` [m/s].
-
-        Returns
-        -------
-        iterations : int
+            Velocity there, written at `rows` [m/s].
+        balance : (2, m) float64
+            Written: the sum, which should be zero, and that of the sizes [N s/m].
+        matrix : (m, m) float64
+            Written: derivatives of the sum [kg/m]; nothing where it is empty.
         """
         m = velocity.size
-        before, owed = velocity.copy(), left.copy()
-        matrix, residual, scale = np.empty((m, m)), np.empty(m), np.empty(m)
-        along, across, change = np.empty(m), np.empty(m), np.zeros(m)
-        iterations, share, smallest = 0, 1.0, np.inf
-        while True:
-            for i in range(m):
-                residual[i] = owed[i] - due[i]
-                scale[i] = abs(owed[i]) + abs(due[i])
-                for j in range(m):
-                    matrix[i, j] = effective_mass[i, j]
-                    moved = effective_mass[i, j] * (velocity[j] - before[j])
-                    residual[i] += moved
-                    scale[i] += abs(moved)
-            for k in range(rows.size):
-                add_node(state[k], rows[k], motion[k], contact, velocity, wall, along, across, matrix, residual, scale)
-            error = size = 0.0
-            for i in range(m):
-                size += residual[i] ** 2
-                if scale[i] > 0.0:
-                    error = max(error, abs(residual[i]) / scale[i])
-            if error < TOLERANCE or iterations == MAX_ITERATIONS:
-                break
-            iterations += 1
-            if size >= smallest and share > SMALLEST_SHARE:
-                # contacts that change back and forth, as between sticking and slipping: half the way
-                share *= 0.5
-                for i in range(m):
-                    velocity[i] += share * change[i]
+        along, across = np.empty(m), np.empty(m)
+        for i in range(m):
+            balance[0, i] = impulse[0, i] - impulse[1, i]
+            balance[1, i] = abs(impulse[0, i]) + abs(impulse[1, i])
+            for j in range(m):
+                moved = mass[i, j] * (velocity[j] - before[j])
+                balance[0, i] += moved
+                balance[1, i] += abs(moved)
+        if matrix.size > 0:
+            matrix[:] = mass
+        for k in range(rows.size):
+            c, g = rows[k], motion[k]
+            ux = uy = 0.0
+            for j in range(m):
+                ux += g[0, j] * velocity[j]
+                uy += g[1, j] * velocity[j]
+            wall[c, 0], wall[c, 1] = ux, uy
+            if contact[c].active <= 0.0 or state[k].solid <= 0.0:
                 continue
-            smallest, share = size, 1.0
-            change[:] = residual
-            solve_dense(matrix, change)
+            push, shear, push_n, shear_n, shear_t = react(state[k], contact[c], ux, uy)
+            if push == 0.0:
+                continue
+            nx, ny = contact[c].normal_x, contact[c].normal_y
+            for j in range(m):
+                along[j], across[j] = nx * g[0, j] + ny * g[1, j], ny * g[0, j] - nx * g[1, j]
+                felt = along[j] * push + across[j] * shear
+                balance[0, j] += felt
+                balance[1, j] += abs(felt)
+            if matrix.size == 0:
+                continue
             for i in range(m):
-                velocity[i] -= change[i]
-        left[:] = residual
-        return iterations
+                by_n, by_t = along[i] * push_n + across[i] * shear_n, across[i] * shear_t
+                for j in range(m):
+                    matrix[i, j] += by_n * along[j] + by_t * across[j]
 
-    return find_velocity
+    return find_balance
+
+
+def _times(matrix, other):
+    """Their product; that of BLAS depends on its number of threads in the last bits."""
+    return np.einsum("ij,j...->i...", matrix, other)
 
 
 @kernel
@@ -261,16 +233,18 @@ class MovingLinings:
         on_lining = np.flatnonzero(contact_of_node >= 0)
         self.node_of_contact = np.zeros(len(on_lining), np.int32)
         self.node_of_contact[contact_of_node[on_lining]] = on_lining
-        self._gather, self._find = gather_kernel(needs), velocity_kernel(needs.wet)
-        self._find_dry = velocity_kernel(False)
+        self._gather, self._find_balance = gather_kernel(needs), balance_kernel(needs.wet)
+        self._find_dry_balance = balance_kernel(False)
         self.wall = np.zeros((len(on_lining), 2))
         self.parts = []
         rings = [(t, ring) for t, ring in enumerate(lining_ring(scene, tunnel) for tunnel in scene.tunnels) if ring]
         ends = np.cumsum([0, *(len(ring.weight) for _, ring in rings)])
         self.displacement, self.velocity, self.left = (np.zeros(ends[-1]) for _ in range(3))
-        joints = np.cumsum([0, *(0 if ring.joints_linear else len(ring.jumps) for _, ring in rings)])
+        moves = [getattr(ring, "moves", np.zeros((0, len(ring.weight)))) for _, ring in rings]
+        pairs = zip(rings, moves, strict=True)
+        joints = np.cumsum([0, *(len(ring.jumps) if felt.size else 0 for (_, ring), felt in pairs)])
         self.memory = np.zeros(joints[-1])
-        for (t, ring), first, last, *joint in zip(rings, ends, ends[1:], joints, joints[1:], strict=False):
+        for (t, ring), felt, first, last, *joint in zip(rings, moves, ends, ends[1:], joints, joints[1:], strict=False):
             rows, tunnel = np.asarray(rows_of_tunnel[t]), scene.tunnels[t]
             x, y = (mesh.nodes[self.node_of_contact[rows]] - [tunnel.x, -tunnel.axis_depth]).T
             theta, radius = np.arctan2(x, y), np.hypot(x, y)
@@ -280,6 +254,7 @@ class MovingLinings:
                     ring=ring,
                     rows=rows,
                     motion=ring.motion(theta, radius),
+                    moves=felt,
                     state=np.zeros(len(rows), STATE_RECORD),
                     due=np.zeros(last - first),
                     memory=self.memory[slice(*joint)],
@@ -297,50 +272,52 @@ class MovingLinings:
             self._gather(system, dt, part.rows, self.node_of_contact, part.state)
             ring_impulse(ring.stiffness, ring.weight, part.displacement, dt, part.due)
             mass = effective_mass(ring, dt)
-            self._solve(self._find, part, system.walls.contact, mass, dt, part.displacement, BETA * dt)
+            self._solve(self._find_balance, part, system.walls.contact, mass, dt)
             part.displacement += dt * part.velocity
 
-    def _solve(self, find, part, contact, mass, dt, start, share):
-        """The ring's velocity; forces of joints that are not linear, of the place `start` + `share` times its change,
-        are linearised where they were found last, halfway back where they miss by more than before.
-        """
-        ring, velocity, left = part.ring, part.velocity, part.left
-        if ring.joints_linear:
-            find(part.state, part.rows, part.motion, contact, mass, part.due, velocity, left, self.wall)
-            return
-        before, owed, place = velocity.copy(), left.copy(), start
-        force, tangent, remembered = ring.joint_forces(place, part.memory)
-        least = np.inf
-        for _ in range(MAX_JOINT_ITERATIONS):
-            due = part.due - dt * (force - tangent @ (place - start))
-            velocity[:], left[:] = before, owed
-            find(
-                part.state, part.rows, part.motion, contact, mass + dt * share * tangent, due, velocity, left,
-                self.wall,
-            )  # fmt: skip
-            found = start + share * (velocity - before)
-            expected, size = force + tangent @ (found - place), np.abs(force) + np.abs(tangent) @ np.abs(place)
-            actual, slope, remembered = ring.joint_forces(found, part.memory)
-            missed = actual - expected
-            if np.all(np.abs(missed) <= ROUNDINGS * np.finfo(float).eps * size):
+    def _solve(self, find_balance, part, contact, mass, dt):
+        """The ring's velocity, that of the wall, and what joints remember; these act as at the end of the step."""
+        ring, before = part.ring, part.velocity.copy()
+        given = part.state, part.rows, part.motion, contact, mass, np.stack([part.left, part.due]), before
+        balance, matrix = np.empty((2, len(before))), np.empty_like(mass)
+        found, force, remembered, least = before, np.zeros(len(part.moves)), part.memory, np.inf
+        for _ in range(MAX_ITERATIONS):
+            place, last = found, force
+            find_balance(*given, place, self.wall, balance, matrix)
+            right = np.vstack([balance[:1], part.moves]).T.copy()
+            solve_dense(matrix, right)
+            found = place - right[:, 0]
+            if force.size:
+                flexibility = dt**2 * _times(part.moves, right[:, 1:])
+                free, near = (_times(part.moves, part.displacement + dt * u) for u in (found, place))
+                try:
+                    force, remembered = ring.joints_between(flexibility, free, near, part.memory)
+                except ArithmeticError as problem:
+                    raise NoJointEquilibrium(part.tunnel) from problem
+                found = found - dt * _times(right[:, 1:], force)
+            to, of, part_way = found, force, 1.0
+            while True:
+                find_balance(*given, found, self.wall, balance, matrix[:0])
+                if force.size:
+                    of_joints = dt * part.moves * force[:, None]
+                    balance += of_joints.sum(axis=0), np.abs(of_joints).sum(axis=0)
+                missed = np.sum(balance[0] ** 2)
+                if missed < least or part_way < SMALLEST_SHARE:
+                    break
+                # contacts that change back and forth, as between sticking and slipping: half the way
+                part_way *= 0.5
+                found, force = place + part_way * (to - place), last + part_way * (of - last)
+            least = missed
+            if part_way == 1.0 and np.all(np.abs(balance[0]) <= TOLERANCE * balance[1]):
                 break
-            miss = np.linalg.norm(missed)
-            if miss < least:
-                least, place, force, tangent = miss, found, actual, slope
-            else:
-                place = 0.5 * (place + found)
-                force, tangent, _ = ring.joint_forces(place, part.memory)
-        else:
-            if not np.linalg.norm(missed) <= MOST_MISSED * np.linalg.norm(actual):
-                raise NoJointEquilibrium(part.tunnel)
-        left += dt * missed
-        part.memory[:] = remembered
+        part.velocity[:], part.left[:], part.memory[:] = found, balance[0], remembered
 
     def settle(self, force, held_liquid, mass, velocity, contact):
         """One pseudo time step of 1 s of the drained relaxation (`mpm.relaxation`): moves the rings, sets `wall`.
 
         The inertia of a ring is fictitious as the soil's, as large as that of its contact nodes; its stiffness acts at
-        the end of the step (Euler backward), so stiff motions settle at once.
+        the end of the step (Euler backward), so stiff motions settle at once. It goes where its velocity takes it when
+        the ground does, at the beginning of the next step: where both are brought to rest neither gets there.
 
         Parameters
         ----------
@@ -365,12 +342,12 @@ class MovingLinings:
             part.state["momentum_solid_x"], part.state["momentum_solid_y"] = free.T
             ring_mass = ring.mass * (mass[nodes].sum() / ring.mass.diagonal().max())
             before = part.velocity.copy()
+            part.displacement += before
             ring_impulse(ring.stiffness, ring.weight, part.displacement + before, 1.0, part.due)
             part.due -= np.einsum("kdm,kd,k->m", part.motion, n, water)
             remembered = part.memory.copy()
-            self._solve(self._find_dry, part, contact, ring_mass + ring.stiffness, 1.0, part.displacement + before, 1.0)
+            self._solve(self._find_dry_balance, part, contact, ring_mass + ring.stiffness, 1.0)
             part.memory[:] = remembered
-            part.displacement += part.velocity
             momentum = np.einsum("ij,j->i", ring_mass, part.velocity)
             energy += float(np.sum(part.velocity * momentum))
             unbalanced += float(np.sum(np.einsum("ij,j->i", ring_mass, part.velocity - before) ** 2))
@@ -384,8 +361,8 @@ class MovingLinings:
     def remember(self):
         """Let the joints remember where they are: in the initial state as if they had gone there straight."""
         for part in self.parts:
-            if not part.ring.joints_linear:
-                part.memory[:] = part.ring.joint_forces(part.displacement, part.memory)[2]
+            if part.moves.size:
+                part.memory[:] = part.ring.joint_forces(part.moves @ part.displacement, part.memory)[2]
 
     def motion_at(self, tunnel, theta):
         """Displacement of the outer face, and the forces of an elastic ring, at theta [degrees].

@@ -39,16 +39,17 @@ class LiningRing:
     Notes
     -----
     Any object may stand for a lining that has these, `outer_radius` [m] and `motion`; `internal_forces` where it knows
-    them; and where its joints are not linear, `joints_linear` False with
+    them; `jumps` (n_joints, 3, m) where it has joints. Joints that are not part of the stiffness feel `moves` (n, m) of
+    the coordinates, and are solved by
 
-    joint_forces(displacement, memory) : force [N/m], its derivative [N/m2], and what the joints remember then:
-        (m,), (m, m), (n,) float64;  `jumps` : (n, 3, m) float64, what the joints feel.
+    joints_between(flexibility, free, start, memory) : forces with which moves = free - flexibility forces, from a start
+        nearby, and what the joints remember then: (n,), (n_joints,) float64; ArithmeticError where there are none
+    joint_forces(moves, memory) : forces, their derivative and what is remembered: (n,), (n, n), (n_joints,)
     """
 
     mass: np.ndarray
     stiffness: np.ndarray
     weight: np.ndarray
-    joints_linear = True
 
     def force(self, displacement):
         """Weight and elastic force at a displacement [N/m], (m,)."""

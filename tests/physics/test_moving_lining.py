@@ -186,8 +186,8 @@ def test_ring_in_elastic_ground_is_that_of_einstein_and_schwartz(deep_scene, sli
     if slip == "full":
         expected = exact_rings.einstein_schwartz_full_slip_moment(k0, nu, flexibility)
     forces = solver.moving.motion_at(0, np.array([0.0, 90.0]))["bending_moment"]
-    # Linear triangles of 0.3 m are too stiff for a field that bends, most where the ground slips: 3 % and 1 %.
-    assert 0.5 * (forces[1] - forces[0]) / (p * radius**2) == pytest.approx(expected, rel=0.04)
+    # elements of 0.3 m are too stiff for a field that bends, most where the ground slips: 1.7 % and 1.2 %
+    assert 0.5 * (forces[1] - forces[0]) / (p * radius**2) == pytest.approx(expected, rel=0.02)
 
 
 # -- the ring and the ground together -------------------------------------------------------------
@@ -305,6 +305,7 @@ def test_lining_gains_the_momentum_that_the_ground_loses(kind):
         ("jointed", 1.0, WEAK),
         ("jointed", 1e5, WEAK),
         ("jointed", DENSITY, WEAK | dict.fromkeys(JOINT_STIFFNESSES, 1e10)),
+        ("jointed", DENSITY, WEAK | dict.fromkeys(JOINT_STIFFNESSES, 1e15)),
         ("jointed", DENSITY, dict.fromkeys(JOINT_STIFFNESSES, 1e15)),
         ("jointed", DENSITY, {"joint_rotational_stiffness": 0.0}),
     ],
@@ -322,8 +323,12 @@ def test_light_heavy_hinged_and_stiff_linings_are_stable(kind, density, ring):
     assert np.abs(solver.lining_impulse).max() < 1e-9 * np.abs(values(solver.impulse, ("soil", "water"))).sum()
 
 
-def test_joints_too_stiff_to_gape_stop_the_run_with_the_reason():
-    solver = solver_of("jointed", ring=WEAK | dict.fromkeys(JOINT_STIFFNESSES, 1e15))
+def test_joints_without_equilibrium_stop_the_run_with_the_reason(monkeypatch):
+    def none(*_):
+        raise ArithmeticError("no forces")
+
+    solver = solver_of("jointed", ring=WEAK)
+    monkeypatch.setattr(solver.moving.parts[0].ring, "joints_between", none)
     with pytest.raises(mpm.RunFailed, match=r"joints of tunnel 0 found no equilibrium .* lower ring\.joint_rotational"):
         solver.relax()
 
