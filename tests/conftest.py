@@ -59,10 +59,23 @@ def once(tmp_path_factory, worker_id):
 
 
 @pytest.fixture(scope="session")
-def event(once):
-    """The scene `quick` until 60 kg/m have come in, and its records."""
-    scene = coupling.load_scene("quick", stop={"inflow_mass": 60.0, "time": 2.0})
-    return scene, once("quick-60", lambda: list(mpm.simulate(scene)))
+def simulated_event(once, quick_scene):
+    """The scene `quick` to its end: records, each with `done` and `unborne_shear` of the simulation; the last state."""
+
+    def simulated():
+        simulation = mpm.Simulation(quick_scene)
+        told = [(simulation.begin(), simulation.done, simulation.unborne_shear)]
+        while not simulation.done:
+            told.append((simulation.advance(), simulation.done, simulation.unborne_shear))
+        return told, simulation.state()
+
+    return once("quick", simulated)
+
+
+@pytest.fixture(scope="session")
+def event(simulated_event, quick_scene):
+    """The scene `quick`, and its records."""
+    return quick_scene, [record for record, *_ in simulated_event[0]]
 
 
 @pytest.fixture(scope="session")

@@ -181,7 +181,8 @@ class Remembered(mpm.Simulation):
 
 
 @pytest.fixture(scope="module", autouse=True)
-def remembered():
+def remembered(simulated_event, quick_scene):
+    Remembered.known[quick_scene.source] = simulated_event[0]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(mpm, "Simulation", Remembered)
         yield

@@ -3,8 +3,10 @@
 import runpy
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 import pytest
 
@@ -20,9 +22,13 @@ EXAMPLES = ROOT / "examples"
 
 
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.stem)
-def test_example_runs(path):
-    result = subprocess.run([sys.executable, "-W", "error", path], capture_output=True, text=True, cwd=ROOT, check=True)
-    assert result.stdout.strip() and not result.stderr
+def test_example_runs(path, monkeypatch, capfd):
+    monkeypatch.chdir(ROOT)
+    with matplotlib.rc_context(), warnings.catch_warnings():
+        warnings.simplefilter("error")
+        runpy.run_path(str(path), run_name="__main__")
+    printed = capfd.readouterr()
+    assert printed.out.strip() and not printed.err
 
 
 @pytest.fixture(scope="module")

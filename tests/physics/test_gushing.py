@@ -12,6 +12,7 @@ import mpm.scene
 import mpm.solver
 from mpm.fields import values
 from mpm.simulation import STEPS_BETWEEN_CHECKS
+from verification.small_event import small_scene
 
 pytestmark = pytest.mark.slow
 
@@ -60,8 +61,8 @@ def test_result_has_the_same_bits_for_any_number_of_threads_and_of_steps_at_once
         solver.relax()
         solver.open_gate()
         batches.append(0)
-        while solver.time < 0.1:
-            limits = solver.advance(0.1, most_substeps)
+        while solver.time < 0.05:
+            limits = solver.advance(0.05, most_substeps)
             assert limits and set(limits) <= {"acoustic", "advective", "output"}
             batches[-1] += 1
         solvers.append(solver)
@@ -75,7 +76,7 @@ def test_result_has_the_same_bits_for_any_number_of_threads_and_of_steps_at_once
 
 
 def test_gate_on_the_left_mirrors_the_gate_on_the_right():
-    scene = coupling.load_scene("quick")
+    scene = small_scene()
     mesh = mpm.build_mesh(scene)
     left = scene.model_copy(update={"gate": scene.gate.model_copy(update={"angle": 270.0})})
     pressures = []
@@ -120,7 +121,7 @@ def test_run_with_a_point_faster_than_weight_can_make_it_stops_as_unstable():
 
 
 def test_sink_takes_material_out_and_counts_it():
-    scene = quick(interior="sink", stop=mpm.scene.Stop(time=0.25))
+    scene = small_scene(interior="sink")
     mesh = mpm.build_mesh(scene)
     solver = mpm.Solver(scene, mesh)
     total = np.sum(solver.points["grain_mass"])

@@ -81,7 +81,7 @@ def test_balances_while_material_gushes(event):
 
 def test_transfers_take_the_energy_that_flutter_feeds(event):
     scene, records = event
-    undamped = scene.model_copy(update={"numerics": scene.numerics.model_copy(update={"stress_damping": 0.0})})
+    undamped = scene.changed(numerics={"stress_damping": 0.0}, stop={"inflow_mass": 40.0})  # the error only grows
     with_it, without = (some[-1].errors["energy_error"] for some in (records, list(simulate(undamped))))
     assert with_it < ERRORS["energy_error"].good and without > 2 * with_it
 

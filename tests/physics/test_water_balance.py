@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from test_heap import box_mesh
 
-import coupling
 import mpm
 from mpm.fields import block, numbers, values
 from mpm.scene import Scene
@@ -125,12 +124,10 @@ def test_even_stress_pushes_no_inner_node_however_points_are_shared_among_triang
 
 
 @pytest.fixture(scope="module")
-def gushing():
-    scene = coupling.load_scene("quick")
-    simulation = mpm.Simulation(scene, threads=1)
-    simulation.begin()
-    while not simulation.done:
-        simulation.advance()
+def gushing(simulated_event, quick_scene, quick_mesh):
+    """The solver at the end of the scene `quick`."""
+    simulation = mpm.Simulation(quick_scene, quick_mesh, threads=1)
+    simulation.restore(simulated_event[1])
     return simulation.solver
 
 

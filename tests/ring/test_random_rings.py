@@ -28,10 +28,10 @@ pytestmark = pytest.mark.slow
 
 @cache
 def cases():
-    """200 rings with their loads, and what the ring of beams makes of them."""
+    """120 rings with their loads, and what the ring of beams makes of them."""
     rng = np.random.default_rng(20261128)
     kinds = list(SPRINGS.values())
-    made = [(random_ring(rng, kinds[k % len(kinds)]), random_balanced_loads(rng)) for k in range(200)]
+    made = [(random_ring(rng, kinds[k % len(kinds)]), random_balanced_loads(rng)) for k in range(120)]
     return [(ring, loads, outcome(BeamSpringLining, ring, loads)) for ring, loads in made]
 
 
@@ -76,7 +76,7 @@ def test_soft_joints_are_rightly_blamed_and_joints_of_a_crushed_ring_are_not():
 
 
 def test_both_models_solve_and_refuse_the_same_random_rings():
-    for ring, loads, beams in cases()[:30]:
+    for ring, loads, beams in cases()[:20]:
         continuum = outcome(ContinuumLining, ring, loads)
         assert isinstance(beams, str) == isinstance(continuum, str), (beams, continuum)
         if isinstance(beams, str):
@@ -160,9 +160,9 @@ def test_loads_have_the_resultants_of_their_tractions(columns):
 
 
 def test_extreme_joints_are_solved_or_refused_alike_by_both_models():
-    """Sixteen of the 64 rings of docs/rings-as-built.md, on a coarse continuum."""
+    """Ten of the 64 rings of docs/rings-as-built.md, on a coarse continuum."""
     rng, answers = np.random.default_rng(0), []
-    for _ in range(16):
+    for _ in range(10):
         ring = extreme_ring(rng, rings.ground())
         pair = [outcome(model, ring, rings.pressures()) for model in (BeamSpringLining, coarse)]
         refused = [isinstance(answer, str) for answer in pair]
@@ -171,7 +171,7 @@ def test_extreme_joints_are_solved_or_refused_alike_by_both_models():
             assert isinstance(answer, str) or answer["equilibrium_residual"] < 1e-8
             assert not isinstance(answer, str) or "no equilibrium" in answer
         answers.append(refused[0])
-    assert 2 < sum(answers) < 14
+    assert 1 < sum(answers) < 9
 
 
 def coarse(ring):
