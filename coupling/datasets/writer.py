@@ -38,7 +38,8 @@ class RunWriter:
     """Appends records to a run file that any reader can open at any moment, also after a kill.
 
     Each batch opens the file, grows the dimensions, writes the data, the times last, and closes it; it reaches the
-    file as a whole or not at all (see `coupling.files.journal`).
+    file as a whole or not at all (see `coupling.files.journal`). h5netcdf makes and grows what netCDF knows; values are
+    written through h5py, without its look-ups.
 
     Parameters
     ----------
@@ -118,10 +119,10 @@ class RunWriter:
         with append_to(self.path) as (file, content):
             file.attrs.update(self.attributes)
             if snapshots:
-                self._write_points(file["points"], snapshots)
+                self._write_points(file["points"], content["points"], snapshots)
             if batch:
-                self._write_lining(file["lining"], batch)
-                self._write_history(file["history"], batch)
+                self._write_lining(file["lining"], content["lining"], batch)
+                self._write_history(file["history"], content["history"], batch)
             yield file, content
         # only now: a write that Ctrl-C cut short is repeated in the same rows
         del self._waiting[: len(batch)]
@@ -189,19 +190,19 @@ class RunWriter:
         del time.attrs["_FillValue"]  # CF knows no missing coordinates: rows without a time are not there yet
         return group
 
-    def _write_lining(self, group, batch):
+    def _write_lining(self, group, stored, batch):
         rows = slice(self._count, self._count + len(batch))
         _grow_to(group, rows.stop)
         for name in self._on_theta if self._n_tunnels else ():
             values = np.array([[self._resample(t, part, name) for t, part in enumerate(r.lining)] for r in batch])
-            group[name][rows] = values if self._n_tunnels > 1 else values[:, 0]
+            stored[name][rows] = values if self._n_tunnels > 1 else values[:, 0]
         for name in JOINT_MOVEMENTS if self._joints else ():
             none = np.full(len(self._joints), np.nan)  # of a lining that is not jointed, beside one that is
             values = np.array([[part.get(name, none) for part in record.lining] for record in batch])
-            group[name][rows] = values if self._n_tunnels > 1 else values[:, 0]
+            stored[name][rows] = values if self._n_tunnels > 1 else values[:, 0]
         for name in PROGRESS:
-            group[name][rows] = [getattr(record, name) for record in batch]
-        group["time"][rows] = [record.time for record in batch]
+            stored[name][rows] = [getattr(record, name) for record in batch]
+        stored["time"][rows] = [record.time for record in batch]
 
     def _resample(self, tunnel, part, name):
         if tunnel not in self._weights:
@@ -210,14 +211,14 @@ class RunWriter:
             return np.full(360, np.nan)
         return self._weights[tunnel] @ part[name]
 
-    def _write_history(self, group, batch):
+    def _write_history(self, group, stored, batch):
         rows = slice(self._count, self._count + len(batch))
         _grow_to(group, rows.stop)
         for name in HISTORY:
-            group[name][rows] = np.array([_history_value(record, name) for record in batch])
-        group["time"][rows] = [record.time for record in batch]
+            stored[name][rows] = np.array([_history_value(record, name) for record in batch])
+        stored["time"][rows] = [record.time for record in batch]
 
-    def _write_points(self, group, snapshots):
+    def _write_points(self, group, stored, snapshots):
         most = max(len(record.points["x"]) for record in snapshots)
         if "point" not in group.dimensions:
             group.dimensions["point"] = None
@@ -230,10 +231,10 @@ class RunWriter:
         for k, record in enumerate(snapshots, start=self._snapshots):
             present = ~record.points.get("removed", np.zeros(len(record.points["x"]), bool))
             for name in self._points:
-                if name in group.variables and name in record.points:
+                if name in stored and name in record.points:
                     values = np.asarray(record.points[name])[present]
-                    group[name][k, : len(values)] = values.astype("f4")
-        group["time"][rows] = [record.time for record in snapshots]
+                    stored[name][k, : len(values)] = values.astype("f4")
+        stored["time"][rows] = [record.time for record in snapshots]
 
 
 def _history_value(record, name):

@@ -24,6 +24,7 @@ FEW = settings(max_examples=150, deadline=None, suppress_health_check=list(Healt
 GOOD = small_scene().source
 
 
+@pytest.mark.slow
 @FEW
 @given(seed=st.integers(0, 2**32))
 def test_any_scene_file_is_planned_or_refused_with_its_line(tmp_path_factory, seed):
@@ -33,6 +34,7 @@ def test_any_scene_file_is_planned_or_refused_with_its_line(tmp_path_factory, se
     wild_scenes.judged(lambda: coupling.load_scene(file), "mine.toml", True)
 
 
+@pytest.mark.slow
 @FEW
 @given(seed=st.integers(0, 2**32))
 def test_any_dotted_change_is_planned_with_its_value_or_refused(seed):
@@ -51,6 +53,7 @@ ANYTHING = st.recursive(
 TABLES = ("name", "gravity", "box", "water", "soils", "tunnels", "gate", "numerics", "stop", "output", "ring")
 
 
+@pytest.mark.slow
 @FEW
 @given(table=st.sampled_from(TABLES), value=ANYTHING)
 @example("soils", [None])
@@ -170,6 +173,7 @@ def test_misspelt_choice_gets_a_suggestion():
         coupling.load_scene("quick", **soil(model="mohr_coulomb"))
 
 
+@pytest.mark.slow
 def test_rough_plan_is_within_a_factor_of_three_of_the_mesh():
     scene = coupling.load_scene("quick")
     rough, exact = rough_plan(scene), plan(scene)

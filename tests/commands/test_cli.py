@@ -69,6 +69,7 @@ def test_poor_error_is_a_warning_with_a_remedy_in_the_run_its_log_and_its_report
     assert "Outside what is expected: water lost" in page and "No warnings" not in page
 
 
+@pytest.mark.slow
 def test_values_of_the_scene_are_set_on_the_command_line(simulated, tmp_path):
     changes = ("--set", "gate.angle=45", "--set", "gate.width=15 cm", "--set", "soils.0.friction_angle=33")
     result = gush("run", "quick", *changes, "--out", tmp_path / "a", "--no-figures")
@@ -108,6 +109,7 @@ def test_scene_file_of_a_run_gives_the_same_scene(simulated, tmp_path):
     assert coupling.load_scene(tmp_path / "a" / "scene.toml") == scene
 
 
+@pytest.mark.slow
 def test_nothing_is_overwritten_without_being_asked(simulated, tmp_path):
     folder = tmp_path / "a"
     run(make_quick_scene(), folder)
@@ -120,6 +122,7 @@ def test_nothing_is_overwritten_without_being_asked(simulated, tmp_path):
     assert (folder / "notes.txt").read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_default_folder_is_numbered_when_taken(simulated, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     folders = [run(make_quick_scene()).attrs["run"] for _ in range(3)]
@@ -127,6 +130,7 @@ def test_default_folder_is_numbered_when_taken(simulated, tmp_path, monkeypatch)
     assert str(default_folder("case-3")) == os.path.join("runs", "case-3")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
 def test_folder_in_use_is_refused(simulated, tmp_path):
     with claimed(tmp_path / "a"):
@@ -235,6 +239,7 @@ def test_scenes_are_listed():
     assert names[0] == "quick" and {"case-1", "case-10", "twin-tunnels"} <= set(names)
 
 
+@pytest.mark.slow
 def test_plan_says_what_is_left_out_and_why(tmp_path):
     result = gush("plan", "quick", "--json", tmp_path / "plan.json")
     assert result.exit_code == 0, result.output
@@ -268,6 +273,7 @@ def events_of(text):
     return [json.loads(line) for line in text.splitlines() if line.startswith("{")]
 
 
+@pytest.mark.slow
 def test_events_tell_stages_warnings_and_the_result_as_json_lines(simulated, tmp_path):
     scene = tmp_path / "soft.toml"
     scene.write_text('base = "quick"\nname = "soft"\n[gate]\nwidth = 0.002\n')
@@ -282,6 +288,7 @@ def test_events_tell_stages_warnings_and_the_result_as_json_lines(simulated, tmp
     assert told[-1]["event"] == "result" and told[-1]["inflow_mass"] == 60.0
 
 
+@pytest.mark.slow
 def test_events_tell_how_a_run_failed(simulated, tmp_path):
     for ending, name, code in (
         (mpm.RunFailed("a material point became non-finite", 0.2, (1.0, -20.0)), "failed", 3),
@@ -297,6 +304,7 @@ def test_events_tell_how_a_run_failed(simulated, tmp_path):
     assert events_of(file.read_text())[-1]["event"] == "refused"
 
 
+@pytest.mark.slow
 def test_quiet_run_prints_nothing_and_logs_all(simulated, tmp_path):
     result = gush("run", "quick", "--out", tmp_path / "a", "--no-figures", "--quiet")
     assert result.exit_code == 0 and result.output == ""

@@ -25,6 +25,7 @@ def test_planned_steps_are_those_that_are_run(tmp_path, intervals):
     assert planned["expected_seconds"] == planned["expected_point_steps"] / planned["point_steps_per_second"]
 
 
+@pytest.mark.slow
 def test_planned_steps_of_a_gate_that_gushes_are_within_a_half_of_those_that_are_run(tmp_path):
     """The flow begins from rest; its critical step is some fifth shorter than that of ground at rest."""
     scene = small_scene(stop={"inflow_mass": 20.0, "time": 1.0}, output={"interval": 0.02})
@@ -42,6 +43,7 @@ def test_expected_time_of_case_3_is_that_of_its_runs(inflow_mass, time):
     assert expected_time(scene) == pytest.approx(time, rel=0.2)
 
 
+@pytest.mark.slow
 def test_plan_tells_the_threads_and_why_it_is_one_with_and_without_a_mesh(monkeypatch):
     monkeypatch.setattr(mpm.solver, "cores", lambda: 2)
 

@@ -35,6 +35,7 @@ def test_quiet_line_and_one_that_is_over_write_nothing(capsys, impatient):
     assert capsys.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_run_in_python_shows_a_line_when_asked(simulated, tmp_path, capsys, impatient, monkeypatch):
     patient = coupling.run.__globals__["read_pressures"]
 
@@ -65,6 +66,7 @@ def test_linear_stability_tells_how_far_it_is(monkeypatch, impatient):
     assert "linear analysis: 1 of 900" in result.stderr and "linear analysis: 3 of 900" in result.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
 def test_forces_in_the_ring_need_no_pictures(simulated, tmp_path):
     assert gush("run", "quick", "--out", tmp_path / "plain", "--no-figures").exit_code == 0

@@ -144,6 +144,7 @@ def test_run_draws_its_checks(folder, tmp_path):
     assert "checks.png" in names
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
 def test_response_again_keeps_the_limits_of_the_scene_and_others_take_their_place(folder, tmp_path):
     result = gush("respond", folder)
@@ -174,6 +175,7 @@ def test_page_of_the_run_tells_and_draws_its_limits(folder):
     assert not np.isinf(shown["player"]["entries"][0]["models"][0]["series"]["bearing_utilisation"]).any()
 
 
+@pytest.mark.slow
 def test_page_of_a_run_without_limits_has_no_such_section(tmp_path):
     from coupling.report import page, run_page
 

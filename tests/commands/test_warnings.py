@@ -26,6 +26,7 @@ def told(act):
     return [str(warning.message) for warning in caught]
 
 
+@pytest.mark.slow
 def test_python_warns_of_what_the_command_line_warns_of(tmp_path):
     scene = small_scene(**UNUSUAL, stop={"inflow_mass": 1.0})
     (tmp_path / "scene.toml").write_text(scene.source)

@@ -13,6 +13,7 @@ from coupling.files.provenance import root_attributes
 from verification.synthetic_run import TwoTriangles, make_quick_scene, record
 
 
+@pytest.mark.slow
 def test_run_is_followed_until_it_ends(tmp_path, monkeypatch):
     scene = make_quick_scene(stop={"inflow_mass": 90.0, "time": 5.0})  # a record has 300 kg/m after a second
     with claimed(tmp_path / "run") as folder:

@@ -111,6 +111,7 @@ def test_input_in_python_gets_own_messages(make, message):
     assert message in str(caught.value) and "pydantic" not in str(caught.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -177,6 +177,7 @@ def test_interrupted_write_is_repeated_in_the_same_rows(tmp_path, monkeypatch):
         np.testing.assert_array_equal(read(tmp_path)["time"], [0.0, 0.5])
 
 
+@pytest.mark.slow
 def test_motion_of_linings_is_written_beside_their_pressures(tmp_path):
     source = make_quick_scene()
     changes = [t.model_dump(exclude_none=True) for t in source.tunnels]

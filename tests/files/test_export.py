@@ -214,6 +214,7 @@ def test_mesh_that_does_not_change_is_written_once(folder, tmp_path):
         assert sum(file[name].dtype.kind == "i" and file[name].shape == (2, 3) for name in file) == 1
 
 
+@pytest.mark.slow
 def test_animation_has_a_picture_a_snapshot_in_the_colours_of_the_maps(folder, tmp_path):
     import matplotlib
     from PIL import Image
@@ -268,6 +269,7 @@ def test_a_new_run_takes_report_and_fields_of_the_old_one_away(folder, tmp_path)
     assert left == {"fields/notes.txt"}
 
 
+@pytest.mark.slow
 def test_info_tells_what_a_file_is(folder, tmp_path):
     report, picture = write_report(folder, tmp_path / "page.html"), export(folder, "gif", tmp_path / "moving")[0]
     series = export(folder, "xdmf", tmp_path / "fields")[0]

@@ -74,6 +74,7 @@ UNITS = {
 ERRORS = {"convergence_horizontal": 1e-4, "joint_opening": 2e-5, "total_pressure": 2e3, "inflow_mass": 5.0}
 
 
+@pytest.mark.slow
 def test_noise_of_the_stated_errors_gives_a_chi_square_of_one_and_a_shift_is_found(run, tmp_path):
     rows = exact(run)
     noise = np.random.default_rng(7).normal(size=len(rows))
@@ -125,6 +126,7 @@ class Grid:
     region = np.zeros(len(elements), int)
 
 
+@pytest.mark.slow
 def test_cell_in_the_ground_reads_a_linear_field_where_it_is(tmp_path, monkeypatch):
     def points(time):
         centres = Grid.nodes[Grid.elements].mean(axis=1)
@@ -259,6 +261,7 @@ def test_all_mistakes_are_told_at_once(run, tmp_path):
     assert "line 4: place" in str(refused.value)
 
 
+@pytest.mark.slow
 def test_command_prints_residuals_and_writes_dataset_and_picture(run, tmp_path):
     rows = exact(run)
     noise = np.random.default_rng(3).normal(size=len(rows))

@@ -85,6 +85,7 @@ def test_model_with_angles_of_its_own_is_brought_to_those_of_the_pressures(tmp_p
     assert own["bending_moment"].attrs == beams["bending_moment"].attrs
 
 
+@pytest.mark.slow
 def test_response_in_a_file_of_an_earlier_version_is_read_at_the_angles_of_the_pressures(tmp_path):
     write_run(tmp_path / "run.nc", models=())
     pressures = read_pressures(tmp_path)

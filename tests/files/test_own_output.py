@@ -24,6 +24,7 @@ def contents(folder):
     return {path: hashlib.sha256(path.read_bytes()).hexdigest() for path in Path(folder).rglob("*") if path.is_file()}
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
 def test_comparison_leaves_the_run_as_it_is(folder, tmp_path):
     before = contents(folder)

@@ -35,6 +35,7 @@ def test_table_of_pressures_has_one_row_a_time_and_angle(run, file):
     assert len(forces) == response.sizes["time"] * response.sizes["theta"]
 
 
+@pytest.mark.slow
 def test_bounds_are_a_coordinate_of_one_name_for_whoever_opens_the_file(file):
     with xr.open_datatree(file, engine="h5netcdf", decode_timedelta=False) as tree:
         pressures = tree["lining"].to_dataset()

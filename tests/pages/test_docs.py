@@ -234,8 +234,7 @@ def test_page_of_the_fit_goes_from_a_table_to_a_band_of_utilisation_in_an_empty_
                 file[f"points/{name}"][:] *= rest
 
     monkeypatch.setattr(import_module("coupling.runs.run"), "run", stand_in)
-    for name, fewer in (("MOST_COMPONENTS", 2), ("FOLDS", 2)):  # a fifth of the processes; the way is the same
-        monkeypatch.setattr(import_module("coupling.fits.emulator"), name, fewer)
+    monkeypatch.setattr(import_module("coupling.fits.emulator"), "MOST_COMPONENTS", 2)  # fewer; the way is the same
     monkeypatch.chdir(tmp_path)
     with matplotlib.rc_context():
         follow(page, whole=True, more=("--workers", "0"))

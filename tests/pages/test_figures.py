@@ -173,6 +173,7 @@ def test_forces_of_two_models_are_drawn_with_their_difference(run):
     np.testing.assert_allclose(axis.lines[0].get_ydata(), 2.0)
 
 
+@pytest.mark.slow
 def test_legend_of_many_checks_stays_within_the_figure(run):
     own = {name: 1e9 for name in ("axial_force", "shear_force", "bending_moment", "convergence_vertical")}
     limits = structure.Limits(gasket_opening=1e-3, gasket_offset=0.1, joint_dislocation=0.01, own=own)

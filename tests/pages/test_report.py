@@ -95,6 +95,7 @@ def test_leading_model_is_the_runs_own_or_the_one_asked_for_whichever_was_writte
     assert result.exit_code == 2 and "there are beam-spring, continuum" in result.output.replace("\n", " ")
 
 
+@pytest.mark.slow
 def test_warnings_name_what_is_missing_or_off(run, tree, tmp_path):
     good = run_page.collect(run)
     assert [text for text in good["warnings"] if "records" not in text and "revision" not in text] == [
@@ -141,6 +142,7 @@ def test_largest_forces_are_those_of_all_records_with_the_other_model_beside(tre
     assert {"axial_force", "shear_force", "bending_moment", "joint_opening"} <= {one.name for one in found.forces}
 
 
+@pytest.mark.slow
 def test_governing_check_is_the_largest_utilisation_and_the_page_begins_with_it(run, tmp_path):
     limits = structure.Limits(joint_dislocation=1e-6, own={"bending_moment": 1e9})
     checked = structure.check(datasets.read_response(run), limits)
@@ -291,6 +293,7 @@ def test_embedded_fields_are_within_half_a_step_of_the_points(tree):
         np.testing.assert_allclose(shown, np.sort(size), rtol=10 ** (1.5 / 255) - 1 + 1e-6)
 
 
+@pytest.mark.slow
 def test_the_page_of_a_long_run_stays_under_six_megabytes(run, tree, monkeypatch):
     """Of noise, which cannot be compressed."""
     records, theta, rng = 5000, np.arange(360.0), np.random.default_rng(2)
@@ -325,6 +328,7 @@ def test_the_page_of_a_long_run_stays_under_six_megabytes(run, tree, monkeypatch
     assert 4e6 < len(page.rendered(data)) < 6e6
 
 
+@pytest.mark.slow
 def test_only_an_earlier_report_is_replaced(run, tmp_path):
     path = page.write_report(run, tmp_path)
     assert path == tmp_path / "report.html" and page.is_report(path)

@@ -34,6 +34,7 @@ def shear_and_friction(solver):
     return np.abs(solver.impulse["shear"]), solver.contact["friction"] * solver.impulse["soil"]
 
 
+@pytest.mark.slow
 def test_bonded_ground_beyond_friction_slips_before_the_gate_opens_and_stays_after():
     simulation = mpm.Simulation(slit(0.43), threads=1)
     first = simulation.begin().lining[0]
@@ -49,6 +50,7 @@ def test_bonded_ground_beyond_friction_slips_before_the_gate_opens_and_stays_aft
     assert change < 0.02 * np.abs(first["soil_shear"]).max()
 
 
+@pytest.mark.slow
 def test_slipped_bond_is_the_frictional_state_of_a_held_lining():
     shears = []
     for contact in ("bonded", "frictional"):
@@ -58,6 +60,7 @@ def test_slipped_bond_is_the_frictional_state_of_a_held_lining():
     assert np.abs(shears[0] - shears[1]).max() < 1e-3 * np.abs(shears[1]).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("k0", "friction"), [(1.0, 0.0), (0.577, 0.29)])
 def test_bonded_ground_that_friction_bears_is_left_as_it_is(k0, friction):
     scene = slit(k0, friction)
@@ -106,6 +109,7 @@ def test_built_in_scenes_bear_most_of_the_bond_or_ask_for_friction(name):
     assert scene.initial_contact == "frictional" or max(shares) < MOST_UNBORNE
 
 
+@pytest.mark.slow
 def test_run_warns_where_much_of_the_bond_slipped(tmp_path):
     told = []
     coupling.run(slit(0.43), tmp_path / "run", warn=told.append)
@@ -114,6 +118,7 @@ def test_run_warns_where_much_of_the_bond_slipped(tmp_path):
     assert 0.3 < coupling.datasets.read_attributes(tmp_path / "run")["initial_unborne_shear"] < 0.4
 
 
+@pytest.mark.slow
 def test_run_of_a_built_in_scene_asks_for_friction_and_is_not_warned_of_slip(tmp_path):
     told = []
     coupling.run(small_scene(stop={"time": 0.01}), tmp_path / "run", warn=told.append)
@@ -121,6 +126,7 @@ def test_run_of_a_built_in_scene_asks_for_friction_and_is_not_warned_of_slip(tmp
     assert coupling.datasets.read_attributes(tmp_path / "run")["initial_unborne_shear"] == 0
 
 
+@pytest.mark.slow
 def test_run_only_notes_a_slip_of_little_shear(tmp_path):
     told = []
     scene = small_scene(stop={"time": 0.01}, initial_contact="bonded", **{"soils.0.k0": 0.577})

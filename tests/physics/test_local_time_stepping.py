@@ -96,6 +96,7 @@ def test_momentum_is_conserved_across_levels(mesh, wet):
     np.testing.assert_allclose(change, ledger[:2], rtol=0, atol=(1e-5 if wet else 1e-11) * impulse)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wet", [False, True])
 def test_undamped_motion_does_not_grow_across_levels(mesh, wet):
     # Forces held back at the nodes between two levels drive motions: without `Levels.ahead` the energy grows a

@@ -201,6 +201,7 @@ def test_built_in_scenes_have_no_flat_triangle_and_the_gate_sets_the_smallest(na
     assert mesh.quality["min_altitude"] > 0.8 * natural
 
 
+@pytest.mark.slow
 def test_meshing_the_largest_case_takes_seconds():
     scene = coupling.load_scene("case-3")
     build_mesh(scene)  # loads what it needs
@@ -209,6 +210,7 @@ def test_meshing_the_largest_case_takes_seconds():
     assert time.process_time() - begin < 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["case-1", "case-3", "quick", "twin-tunnels"])
 def test_estimated_elements_are_those_of_the_mesh_within_a_fifth(name):
     scene = coupling.load_scene(name)
@@ -324,6 +326,7 @@ def crossed_levels(mesh, heights):
     return [int(((y.min(axis=1) < h - 1e-9) & (y.max(axis=1) > h + 1e-9)).sum()) for h in heights]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angle", [0.0, 90.0, 137.0])
 @pytest.mark.parametrize("depth", [2.5, 10.0, 22.9, 30.0])
 def test_ground_water_table_is_a_mesh_line_interrupted_by_the_lining(quick_scene, angle, depth):
@@ -344,6 +347,7 @@ def test_water_table_beside_another_line_the_gate_or_the_crown_spoils_no_cells(q
     assert crossed_levels(mesh, [-7.3]) == [0] and crossed_levels(mesh, [-table])[0] > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("depths", [(24.4, 26.0), (2.0, 3.5), (10.0, 10.5)])
 def test_layers_thinner_than_an_element_have_two_rows_of_cells(quick_scene, depths):
     layer = quick_scene.soils[0].model_dump()
@@ -361,6 +365,7 @@ def test_layer_through_the_gate_is_refused(quick_scene):
         build_mesh(changed(scene, soils=soils))
 
 
+@pytest.mark.slow
 def test_layer_that_leaves_a_sliver_above_the_crown_is_refused_with_its_place(quick_scene):
     scene = quick_scene
     layer = scene.soils[0].model_dump()

@@ -25,6 +25,7 @@ def steps_of(scene):
     return records, np.array(calls)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("interval", [0.005, 0.5])
 @pytest.mark.parametrize("target", [1.0, 20.0])
 def test_event_ends_with_the_step_of_the_smallest_elements_that_passes_the_inflow(interval, target):
@@ -37,6 +38,7 @@ def test_event_ends_with_the_step_of_the_smallest_elements_that_passes_the_inflo
     assert (calls[:-1, 1] < target).all()
 
 
+@pytest.mark.slow
 def test_steps_are_not_shortened_far_from_the_stop():
     far, alone = (
         steps_of(small_scene(stop=stop, output={"interval": 0.02}))[0][-1].steps

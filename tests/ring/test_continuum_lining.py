@@ -184,6 +184,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", SOLVED)
 @pytest.mark.filterwarnings("ignore:pressures. soil and water pull the ring outward")  # suction is one of them
 def test_extremes_are_solved_alike_by_both_models(case):

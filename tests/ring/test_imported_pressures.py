@@ -64,6 +64,7 @@ def test_angles_may_begin_anywhere_in_any_order_and_close_the_circle(right):
         check_pressures(closed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "time",
     [
@@ -108,6 +109,7 @@ def half_a_ring():
     return loads(np.arange(0.0, 181.0, 10.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("data", "message"),
     [
@@ -138,6 +140,7 @@ def test_mirrored_half_is_the_whole():
     same(model.respond(xr.concat([half, other], "theta")), model.respond(loads(np.arange(0.0, 360.0, 10.0))))
 
 
+@pytest.mark.slow
 def test_ring_in_tension_or_under_less_than_its_own_weight_is_warned_of(tmp_path):
     ring = RING.model_copy(update={"ground": RING.ground.model_copy(update={"two_way": True, "law": "linear"})})
     pulled = -loads()
@@ -201,6 +204,7 @@ def test_record_without_a_time_in_a_file_is_refused(tmp_path):
         read_source(tmp_path / "mine.nc")
 
 
+@pytest.mark.slow
 def test_any_file_gives_what_was_meant_or_is_warned_of_or_refused(tmp_path):
     for number in range(60):
         given, true, kind = wild_pressures(random.Random(number))

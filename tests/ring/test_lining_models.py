@@ -39,6 +39,7 @@ def test_models_are_found_by_name():
         structure.register_lining_model("continuum", structure.BeamSpringLining)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
 def test_example_of_the_documentation_is_a_model(example, written, tmp_path):
     assert structure.lining_model("efficiency") is example
@@ -88,6 +89,7 @@ def test_file_without_a_model_is_refused(written, tmp_path, code, name, message)
 LIMITS = "gasket_opening = 6e-3\ngasket_offset = 0.1\njoint_dislocation = 10e-3\nconvergence_per_mille = 5.0\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", ["beam-spring", "continuum"])
 def test_response_is_held_against_limits_of_a_file(written, tmp_path, backend):
     (tmp_path / "limits.toml").write_text(LIMITS)
@@ -115,6 +117,7 @@ def test_limits_that_mean_nothing_are_refused(written, tmp_path, text, message):
     assert missing.exit_code == 2 and "cannot be read" in missing.output
 
 
+@pytest.mark.slow
 def test_comparison_of_a_file_written_by_hand(written, tmp_path):
     result = gush("compare", written, "--out", tmp_path / "out", "--json", tmp_path / "data.json")
     assert result.exit_code == 0, result.output

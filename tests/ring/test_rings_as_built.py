@@ -23,6 +23,7 @@ def test_joints_of_one_kind_may_be_stated_one_by_one(model):
     np.testing.assert_array_equal(one["bending_moment"], other["bending_moment"])
 
 
+@pytest.mark.slow
 @BOTH
 def test_ring_with_joints_of_its_own_is_mirrored_with_them(model):
     angles = (20.0, 100.0, 190.0, 300.0)
@@ -82,6 +83,7 @@ def test_leaning_faces_carry_the_thrust_by_pressure_and_shear(model, contact):
     assert response["displacement_radial"][0] < plain["displacement_radial"][0] - 1e-3
 
 
+@pytest.mark.slow
 @BOTH
 def test_key_slides_out_where_its_faces_lean_more_than_friction_holds(model):
     """tan 6 degrees = 0.105: with friction above that the key holds without any ground, below it falls."""

@@ -20,6 +20,7 @@ def staggered(**changes):
     return Neighbour(**(STIFF | changes))
 
 
+@pytest.mark.slow
 @BOTH
 @pytest.mark.parametrize("laws", [{}, WEAK], ids=["linear", "weak"])
 def test_rings_without_coupling_answer_as_alone(model, laws):
@@ -33,6 +34,7 @@ def test_rings_without_coupling_answer_as_alone(model, laws):
     assert largest(paired["circumferential_radial_force"]) == 0
 
 
+@pytest.mark.slow
 @BOTH
 @pytest.mark.parametrize("laws", [{}, WEAK], ids=["linear", "weak"])
 def test_ring_beside_answers_the_same_seen_from_its_side(model, laws):
@@ -49,6 +51,7 @@ def test_ring_beside_answers_the_same_seen_from_its_side(model, laws):
     assert here["equilibrium_residual"].max() < 1e-8 and there["equilibrium_residual"].max() < 1e-8
 
 
+@pytest.mark.slow
 @BOTH
 def test_rings_that_are_not_turned_pass_nothing_on(model):
     loads = pressures(3).isel(time=[2])
@@ -58,6 +61,7 @@ def test_rings_that_are_not_turned_pass_nothing_on(model):
     assert largest(response["bending_moment"] - alone["bending_moment"]) < 1e-6 * largest(alone["bending_moment"])
 
 
+@pytest.mark.slow
 @BOTH
 def test_a_stiff_neighbour_takes_the_moment_that_a_joint_releases(model):
     """Soft joints; the pair stands between the ring alone and one without joints, and what a joint drops the other
