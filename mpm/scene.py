@@ -81,6 +81,8 @@ class Tunnel(Part):
     lining_harmonics : int
         Fourier harmonics of the displacement of an elastic lining, 2 ovalises it; of a jointed one those of pressure
         and shear that its coordinates are exact for.
+    lining_model : str
+        Whose segments and joints a jointed one has: "beam-spring" or "continuum".
     """
 
     x: Length
@@ -93,6 +95,7 @@ class Tunnel(Part):
     lining_modulus: Pressure | None = Field(default=None, ge=1e6, le=1e13)
     lining_poissons_ratio: float | None = Field(default=None, ge=0, lt=0.5)
     lining_harmonics: int = Field(default=8, ge=2, le=40)
+    lining_model: Literal["beam-spring", "continuum"] = "beam-spring"
 
     @model_validator(mode="after")
     def _check(self):

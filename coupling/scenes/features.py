@@ -163,7 +163,7 @@ def _linings(s):
     kinds = [
         f"'elastic', {t.lining_modulus / 1e9:g} GPa, {t.lining_harmonics} harmonics"
         if s.lining_of(t) == "elastic"
-        else f"'{s.lining_of(t)}'"
+        else f"'{s.lining_of(t)}'" + (f", {t.lining_model}" if s.lining_of(t) == "jointed" else "")
         for t in s.tunnels
     ] or [f"'{s.lining}'"]
     if len(set(kinds)) == 1:

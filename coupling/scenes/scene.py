@@ -141,11 +141,11 @@ class Scene(Input, MpmScene):
         return self
 
     def jointed_ring(self, tunnel: Tunnel) -> Any:
-        """The ring of a tunnel as it moves in the ground: beams and joints, reduced (:mod:`structure.reduced`)."""
+        """The ring of a tunnel as it moves in the ground, reduced (:mod:`structure.reduced`)."""
         from structure.models import lining_model
         from structure.reduced import ReducedRing
 
-        model = lining_model("beam-spring")(ring_of(self, self.tunnels.index(tunnel)))
+        model = lining_model(tunnel.lining_model)(ring_of(self, self.tunnels.index(tunnel)))
         return ReducedRing(model, tunnel.lining_density, self.gravity, tunnel.lining_harmonics)
 
     @model_validator(mode="after")

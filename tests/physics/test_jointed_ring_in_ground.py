@@ -15,7 +15,7 @@ from mpm.walls.contact import FIXED_X, FIXED_Y
 from structure import BeamSpringLining, Ground, theory
 from verification.problems.exact_rings import einstein_schwartz_full_slip_moment, einstein_schwartz_no_slip_moment
 from verification.problems.jointed_rings import ElasticGround, HingedRing, ring_in_ground
-from verification.small_event import small_scene
+from verification.small_event import COARSE, small_scene
 
 pytestmark = pytest.mark.slow
 
@@ -226,3 +226,57 @@ def test_energy_of_the_ring_grows_by_what_ground_and_weight_do(laws):
         x_before = x_old
     assert energy() - before == pytest.approx(given, abs=1e-9 * size)
     assert size > 1.0
+
+
+def twins(**changes):
+    """Solver of two tunnels side by side, relaxed, each with its own jointed ring."""
+    scene = coupling.load_scene(
+        "twin-tunnels", lining="jointed", initial_contact="bonded", numerics={"relaxation_tolerance": 1e-4},
+        discretisation=COARSE | {"element_size_lining": 0.6}, **changes,
+    )  # fmt: skip
+    solver = mpm.Solver(scene, mpm.build_mesh(scene), threads=1)
+    solver.relax()
+    return solver
+
+
+def test_rings_of_twin_tunnels_are_mirror_images():
+    solver = twins(gate="none", stop={"time": 1.0})
+    left, right = (solver.moving.motion_at(tunnel, np.arange(360.0)) for tunnel in (0, 1))
+    for name, most in (("displacement_radial", 0.002), ("axial_force", 0.005), ("bending_moment", 0.01)):
+        mirrored = np.roll(right[name][::-1], 1)
+        assert left[name] == pytest.approx(mirrored, abs=most * np.abs(mirrored).max())
+
+
+def test_each_of_two_tunnels_has_its_own_joints_that_slide():
+    weak = GAPING | {"joint_friction_coefficient": 0.05}
+    solver = twins(ring=weak)
+    settled = solver.lining_displacement.copy()
+    assert len(solver.joint_memory) == 2 * len(solver.scene.ring.joint_angles)
+    solver.open_gate()
+    while solver.time < 0.05:
+        solver.advance(0.05)
+    own, other = np.split(np.abs(solver.lining_displacement - settled), 2)
+    assert own[3:].max() > 2 * other[3:].max() > 0.0  # the one with the gate deforms most
+    slips, beside = np.split(np.abs(solver.joint_memory), 2)
+    assert slips.max() > 1e-5 and beside.max() > 1e-5 and not np.allclose(slips, beside[::-1], rtol=1e-2)
+    assert solver.balances()["contact_error"] < 1e-13
+
+
+@pytest.mark.parametrize("laws", [{}, GAPING], ids=["linear", "gaping"])
+def test_ring_of_either_lining_model_moves_alike_in_the_ground(laws):
+    found = []
+    for model in ("beam-spring", "continuum"):
+        scene = small_scene(lining="jointed", ring=laws, initial_contact="bonded")
+        tunnel = scene.tunnels[0].model_copy(update={"lining_model": model})
+        scene = scene.model_copy(update={"tunnels": (tunnel,)})
+        solver = mpm.Solver(scene, mpm.build_mesh(scene), threads=1)
+        solver.relax()
+        solver.open_gate()
+        while solver.time < 0.03:
+            solver.advance(0.03)
+        found.append(solver.moving.motion_at(0, np.arange(360.0)))
+    beams, continuum = found
+    # measured 0.2, 1.0, 2.1 %: M of a curved section differs by N t^2/(12 R), 2 % of it here
+    for name, most in (("axial_force", 0.005), ("displacement_radial", 0.005), ("bending_moment", 0.03)):
+        assert continuum[name] == pytest.approx(beams[name], abs=most * np.abs(beams[name]).max())
+    assert continuum["joint_opening"] == pytest.approx(beams["joint_opening"], rel=0.01)
