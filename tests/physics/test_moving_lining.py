@@ -333,6 +333,19 @@ def test_joints_without_equilibrium_stop_the_run_with_the_reason(monkeypatch):
         solver.relax()
 
 
+@pytest.mark.parametrize(("kind", "ring"), [("elastic", {}), ("jointed", {}), ("jointed", WEAK)])
+def test_ring_at_rest_stays_at_rest(kind, ring):
+    relaxation = {"relaxation_tolerance": 1e-9}
+    solver = solver_of(kind, ring=ring, gate="none", initial_contact="frictional", numerics=relaxation)
+    solver.relax()
+    before = solver.moving.motion_at(0, np.arange(360.0))
+    while solver.time < 0.05:
+        solver.advance(0.05)
+    after = solver.moving.motion_at(0, np.arange(360.0))
+    for name in ("displacement_radial", "axial_force", "bending_moment"):
+        assert after[name] == pytest.approx(before[name], abs=1e-6 * np.abs(before[name]).max())  # measured 6e-8
+
+
 def test_ring_with_stiff_joints_is_the_elastic_one():
     ovalised, moments = [], []
     stiff = {"section": "euler-bernoulli"} | dict.fromkeys(JOINT_STIFFNESSES, 1e15)
