@@ -277,7 +277,7 @@ class MovingLinings:
 
     def _solve(self, find_balance, part, contact, mass, dt):
         """The ring's velocity, that of the wall, and what joints remember; these act as at the end of the step."""
-        ring, before = part.ring, part.velocity.copy()
+        before = part.velocity.copy()
         given = part.state, part.rows, part.motion, contact, mass, np.stack([part.left, part.due]), before
         balance, matrix = np.empty((2, len(before))), np.empty_like(mass)
         found, force, remembered, least = before, np.zeros(len(part.moves)), part.memory, np.inf
@@ -286,15 +286,7 @@ class MovingLinings:
             find_balance(*given, place, self.wall, balance, matrix)
             right = np.vstack([balance[:1], part.moves]).T.copy()
             solve_dense(matrix, right)
-            found = place - right[:, 0]
-            if force.size:
-                flexibility = dt**2 * _times(part.moves, right[:, 1:])
-                free, near = (_times(part.moves, part.displacement + dt * u) for u in (found, place))
-                try:
-                    force, remembered = ring.joints_between(flexibility, free, near, part.memory)
-                except ArithmeticError as problem:
-                    raise NoJointEquilibrium(part.tunnel) from problem
-                found = found - dt * _times(right[:, 1:], force)
+            found, force, remembered = self._with_joints(part, dt, place, place - right[:, 0], right[:, 1:])
             to, of, part_way = found, force, 1.0
             while True:
                 find_balance(*given, found, self.wall, balance, matrix[:0])
@@ -311,6 +303,23 @@ class MovingLinings:
             if part_way == 1.0 and np.all(np.abs(balance[0]) <= TOLERANCE * balance[1]):
                 break
         part.velocity[:], part.left[:], part.memory[:] = found, balance[0], remembered
+
+    @staticmethod
+    def _with_joints(part, dt, place, free, answers):
+        """Velocity of a ring with its joints, their forces, what they remember; `answers` (m, n) of it to these forces.
+
+        place, free : (m,) float64, velocities at hand and without the joints.
+        """
+        moves = part.moves
+        if not moves.size:
+            return free, np.zeros(0), part.memory
+        flexibility = dt**2 * _times(moves, answers)
+        apart, near = (_times(moves, part.displacement + dt * velocity) for velocity in (free, place))
+        try:
+            force, remembered = part.ring.joints_between(flexibility, apart, near, part.memory)
+        except ArithmeticError as problem:
+            raise NoJointEquilibrium(part.tunnel) from problem
+        return free - dt * _times(answers, force), force, remembered
 
     def settle(self, force, held_liquid, mass, velocity, contact):
         """One pseudo time step of 1 s of the drained relaxation (`mpm.relaxation`): moves the rings, sets `wall`.

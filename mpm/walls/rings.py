@@ -13,16 +13,15 @@ import numpy as np
 BETA = 0.25
 
 
-def effective_mass(ring, dt, joints=0.0):
-    """M + beta dt^2 (K + joints) [kg/m], (m, m), of a ring and the stiffness of joints that are not linear [N/m2].
+def effective_mass(ring, dt):
+    """M + beta dt^2 K [kg/m], (m, m), of a ring.
 
     With velocities half a step before the displacements, u1 = u0 + dt a and x1 = x0 + dt u1, an acceleration
     (M + dt^2/4 K) a = weight - K x0 - reactions is the trapezoidal rule: every frequency of the ring is stable at any
     dt and none is damped. The rest of a coupled system, advanced by the same leapfrog without the extra mass, keeps the
-    critical step that it has beside a ring without stiffness (Belytschko & Mullen 1978). In the means of the
-    displacements before and after it is the implicit midpoint rule, which takes forces at x0 + beta dt (u1 - u0).
+    critical step that it has beside a ring without stiffness (Belytschko & Mullen 1978).
     """
-    return ring.mass + BETA * dt**2 * (ring.stiffness + joints)
+    return ring.mass + BETA * dt**2 * ring.stiffness
 
 
 @dataclass(frozen=True, eq=False)
