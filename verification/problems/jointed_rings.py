@@ -1,120 +1,113 @@
-"""A thin ring with elastic hinges in elastic ground under the stress before the tunnel, as Fourier series.
+"""A jointed ring that moves in elastic ground, as far as the relaxation of the initial state takes it."""
 
-Harmonic n of the ground answers by Airy's functions r^m cos(n theta), m = n, n + 2, -n, 2 - n (Michell 1899). A hinge
-that turns by phi is a curvature phi delta(s): the ring, stretched by e = (w + v')/R and bent by kappa = (v' - w'')/R^2,
-carries M = EI (kappa - sum of phi delta), finite at the hinges, where M = k phi. Signs as in
-:mod:`structure.response`; theta in radians from the crown, clockwise; plane strain.
-"""
-
-from __future__ import annotations
-
-from typing import NamedTuple
+import time
 
 import numpy as np
 
-#: Highest harmonic: terms fall as the third power.
-LAST = 400
-#: Exponent of a harmonic that does not reach where the ground is held.
-FAR = 20.0
+import coupling
+import mpm
+from mpm.fields import block
+from mpm.mesh import SOIL, Mesh
+from mpm.meshing import crossed
+from mpm.walls.contact import FIXED_X, FIXED_Y
+from verification.problems.exact_jointed_rings import ElasticGround, HingedRing, ring_in_ground
+from verification.problems.problem import Problem, Result, register
+
+OUTER, INNER, CONCRETE, POISSON = 3.3, 3.26, 1e13, 0.3
+RADIUS, THICKNESS = (OUTER + INNER) / 2, OUTER - INNER
+MODULUS = CONCRETE / (1 - 0.2**2)
+AXIAL, BENDING = MODULUS * THICKNESS, MODULUS * THICKNESS**3 / 12
+HINGES = (30.0, 60.0)  # and their mirror images [degrees]
+VERTICAL, HORIZONTAL = 1e3, 5e2  # weight is nothing beside it [Pa]
+THETA = np.arange(0.0, 91.0, 15.0)
 
 
-class ElasticGround(NamedTuple):
-    """Ground around a ring of radius R [m]: modulus [Pa], Poisson's ratio, and the radius where it is held [m]."""
-
-    radius: float
-    youngs_modulus: float
-    poissons_ratio: float
-    held_at: float = np.inf
-
-    def stiffness(self, n: int) -> np.ndarray:
-        """Tractions (outward cos, clockwise sin) that move its face by one, per area: (2, 2) [Pa/m]."""
-        shear, kappa = self.youngs_modulus / (2 * (1 + self.poissons_ratio)), 3 - 4 * self.poissons_ratio
-        size = self.radius
-
-        def fields(m, r):
-            power = (r / (self.held_at if m > 1 else size)) ** (m - 1)
-            stress = np.array([m - n**2, n * (m - 1)]) * power / r
-            moved = np.array([-m, n]) * power
-            if m == n + 2:
-                moved = np.array([kappa - 1 - n, kappa + 1 + n]) * power
-            elif m == 2 - n:
-                moved = np.array([kappa - 1 + n, n - 1 - kappa]) * power
-            return stress, moved / (2 * shear)
-
-        if n == 0:
-            outside = 1 / self.held_at**2
-            moved, strain = 1 / size - size * outside, -1 / size**2 - outside
-            hoop = 1 / size**2 - outside
-            nu = self.poissons_ratio
-            stress = 2 * shear / (1 - 2 * nu) * ((1 - nu) * strain + nu * hoop)
-            return np.array([[-stress / moved, 0.0], [0.0, 2 * shear / size]])
-        far = n * np.log(self.held_at / size) > FAR
-        modes = (-n, 2 - n) if far else (n, n + 2, -n, 2 - n)
-        stress, moved = (np.stack(part, axis=1) for part in zip(*(fields(m, size) for m in modes), strict=True))
-        free = np.eye(len(modes))
-        if len(modes) == 4:
-            there = np.stack([fields(m, self.held_at)[1] for m in modes], axis=1)
-            free = np.linalg.svd(there)[2][2:].T
-        return -stress @ free @ np.linalg.inv(moved @ free)
+def ring_mesh(tunnel, radii, around):
+    """Mesh of the ground between circles about a tunnel, `around` cells each."""
+    angle = 2 * np.pi * np.arange(around) / around
+    circle, axis = np.stack([np.sin(angle), np.cos(angle)], axis=1), np.array([tunnel.x, -tunnel.axis_depth])
+    nodes = (np.asarray(radii)[:, None, None] * circle).reshape(-1, 2) + axis
+    layer, here = np.indices((len(radii) - 1, around)) * [[[around]], [[1]]]
+    there = (here + 1) % around
+    corners = layer + here, layer + there, layer + around + there, layer + around + here
+    nodes, triangles = crossed(nodes, np.stack(corners, axis=-1).reshape(-1, 4))
+    none = np.zeros(0, np.int32)
+    names = "left", "right", "bottom", "top", "opening_nodes", "corner_nodes", "wall_nodes", "inner_nodes"
+    return Mesh(
+        nodes=nodes, elements=triangles.astype(np.int32), region=np.full(len(triangles), SOIL, np.int8),
+        outer_nodes=(np.arange(around, dtype=np.int32),), outer_theta=(np.degrees(angle),), gate_angle=np.nan,
+        wall_side=none.astype(np.int8), corner_side=none.astype(np.int8), inner_opening_nodes=none,
+        **dict.fromkeys(names, none),
+    )  # fmt: skip
 
 
-class HingedRing(NamedTuple):
-    """A thin ring with elastic hinges.
+def relaxed(radii, around, *, bonded, rotational_stiffness, youngs_modulus, lining_model="beam-spring"):
+    """Solver of a ring with eight joints in equilibrium with elastic ground between circles [m], the outer one held.
 
-    Radius of its centre line [m], axial and bending stiffness [N/m], [N m]; angles [rad] between crown and waist of
-    hinges, each of which stands for four of a doubly symmetric ring; their rotational stiffness [N m/rad/m].
+    Returns it and the processor time of the relaxation [s].
     """
+    ring = {
+        "inner_diameter": 2 * INNER, "concrete_modulus": CONCRETE, "section": "euler-bernoulli",
+        "joint_angles": sorted(a for h in HINGES for a in (h, 180 - h, 180 + h, 360 - h)),
+        "joint_rotational_stiffness": rotational_stiffness, "joint_normal_stiffness": 1e12,
+        "joint_shear_stiffness": 1e12,
+    }  # fmt: skip
+    scene = coupling.load_scene(
+        "quick", water="none", gate="none", lining="jointed", initial_contact="bonded" if bonded else "frictional",
+        gravity=1e-6, box={"width": 80.0, "depth": 80.0}, numerics={"relaxation_tolerance": 1e-3}, ring=ring,
+    )  # fmt: skip
+    soil = scene.soils[0].model_copy(
+        update={"model": "elastic", "youngs_modulus": youngs_modulus, "poissons_ratio": POISSON}
+    )
+    geometry = {"cover": 36.7, "inner_diameter": 2 * INNER, "lining_harmonics": 16}
+    kind = {"friction_coefficient": 0.0, "lining_model": lining_model}
+    tunnel = scene.tunnels[0].model_copy(update=geometry | kind)
+    scene = scene.model_copy(update={"soils": (soil,), "tunnels": (tunnel,)})
+    mesh = ring_mesh(tunnel, radii, around)
+    solver = mpm.Solver(scene, mesh, threads=1)
+    stress = [-HORIZONTAL, -VERTICAL, -POISSON * (HORIZONTAL + VERTICAL), 0.0]
+    block(solver.points, "stress_xx", "stress_xy")[:] = stress
+    outside = np.hypot(*(mesh.nodes - [tunnel.x, -tunnel.axis_depth]).T) > radii[-1] - 1e-6
+    solver.fixed[outside] |= FIXED_X | FIXED_Y
+    begin = time.process_time()
+    _, residual = solver.relax()
+    assert residual < scene.numerics.relaxation_tolerance
+    return solver, time.process_time() - begin
 
-    radius: float
-    axial_stiffness: float
-    bending_stiffness: float
-    hinges: tuple[float, ...]
-    rotational_stiffness: float
+
+def exact(rotational_stiffness, *, bonded, youngs_modulus, held, hinges=HINGES):
+    """The closed form of the same."""
+    ring = HingedRing(RADIUS, AXIAL, BENDING, tuple(np.radians(hinges)), rotational_stiffness)
+    ground = ElasticGround(OUTER, youngs_modulus, POISSON, held)
+    return ring_in_ground(ring, ground, VERTICAL, HORIZONTAL, np.radians(THETA), bonded)
 
 
-class Response(NamedTuple):
-    """Bending moment [N m/m], outward displacement [m] at the angles asked for; rotations of the hinges [rad]."""
+def jointed_ring(around=120, rotational_stiffness=2e7, bonded=False, youngs_modulus=5e6, held=13.0):
+    """A ring with joints of a `rotational_stiffness` [N m/rad/m], 0 for hinges, in ground held at a radius [m]."""
+    radii = OUTER * (held / OUTER) ** np.linspace(0, 1, around // 5 + 1)
+    ways = {"bonded": bonded, "youngs_modulus": youngs_modulus}
+    solver, seconds = relaxed(radii, around, rotational_stiffness=rotational_stiffness, **ways)
+    found = solver.moving.motion_at(0, THETA)
+    answer = exact(rotational_stiffness, **ways, held=held)
+    rigid = exact(rotational_stiffness, **ways, held=held, hinges=()).bending_moment
+    moved, moment = answer.displacement_radial, answer.bending_moment
+    errors = {
+        "rotation": np.abs(found["joint_rotation"][:2] / answer.rotation - 1).max(),
+        "displacement": np.abs(found["displacement_radial"] - moved).max() / np.abs(moved).max(),
+        "moment": np.abs(found["bending_moment"] - moment).max() / np.abs(rigid).max(),
+    }
+    return Result.of(solver, seconds, max(errors.values()), **errors)
 
-    bending_moment: np.ndarray
-    displacement_radial: np.ndarray
-    rotation: np.ndarray
 
-
-def ring_in_ground(
-    ring: HingedRing, ground: ElasticGround, vertical: float, horizontal: float, theta: np.ndarray, bonded: bool
-) -> Response:
-    """Response to the stress [Pa] that the ground would have without a tunnel, compression positive.
-
-    Plane sections carry the ring's movement from its centre line to the face of the ground.
-    """
-    radius, bending, hinges = ring.radius, ring.bending_stiffness, np.asarray(ring.hinges)
-    lever, area = (ground.radius - radius) / radius, ground.radius / radius
-    mean, deviator = (vertical + horizontal) / 2, (vertical - horizontal) / 2
-    # of moment and displacement at theta and of moment at the hinges: from the load, and per rotation of each hinge
-    loaded, turned = np.zeros((3, len(theta))), np.zeros((2, len(theta), len(hinges)))
-    at_hinges, by_hinges = np.zeros(len(hinges)), np.zeros((len(hinges), len(hinges)))
-    for n in range(0, LAST + 1, 2):
-        kinks = (2 if n == 0 else 4) / (np.pi * radius) * np.cos(n * hinges)
-        stretch, bend = np.array([1.0, n]) / radius, np.array([n**2, n]) / radius**2
-        around = ground.stiffness(n)
-        load = {0: np.array([-mean, 0.0]), 2: np.array([-deviator, deviator])}.get(n, np.zeros(2))
-        if not bonded:
-            along = around[1] / around[1, 1]
-            load = np.array([load[0] - load[1] * along[0], 0.0])
-            around = np.array([[around[0, 0] - around[0, 1] * along[0], 0.0], [0.0, 0.0]])
-        face = np.array([[1.0, 0.0], [n * lever, 1 + lever]])
-        load, around = area * face.T @ load, area * face.T @ around @ face
-        stiffness = ring.axial_stiffness * np.outer(stretch, stretch) + bending * np.outer(bend, bend) + around
-        if n == 0:
-            stiffness[1, 1] = 1.0
-        moved, by_kink = np.linalg.solve(stiffness, np.stack([load, bending * bend], axis=1)).T
-        moment, left = bending * bend @ moved, bending * (bend @ by_kink - 1)
-        cosine, there = np.cos(n * theta), np.cos(n * hinges)
-        loaded[0] += moment * cosine
-        loaded[1] += moved[0] * cosine
-        turned[0] += left * np.outer(cosine, kinks)
-        turned[1] += by_kink[0] * np.outer(cosine, kinks)
-        at_hinges += moment * there
-        by_hinges += left * np.outer(there, kinks)
-    rotation = np.linalg.solve(ring.rotational_stiffness * np.eye(len(hinges)) - by_hinges, at_hinges)
-    return Response(loaded[0] + turned[0] @ rotation, loaded[1] + turned[1] @ rotation, rotation)
+register(Problem(
+    name="jointed-ring", title="jointed ring that moves in elastic ground",
+    source="Fourier series of a ring with springs in ground after Michell (1899)",
+    norm="the largest of: rotations of the joints, relative; displacement over the largest; moment over that without "
+    "joints",
+    solve=jointed_ring, fast={"around": 120},
+    ladder={
+        "around": (30, 60, 120, 240), "rotational_stiffness": (0.0, 2e6, 2e7, 2e8), "bonded": (False, True),
+        "youngs_modulus": (5e5, 5e6, 5e7),
+    },
+    limit=0.01, why="elements of 0.17 m for a field that bends, where joints turn most",
+))  # fmt: skip

@@ -10,7 +10,7 @@ from typing import Any
 #: Modules of this package that register problems when they are imported.
 FAMILIES = (
     "columns", "waves", "motion", "conservation", "plasticity", "soil_laws", "flows", "earth_pressure", "cavities",
-    "slots",
+    "slots", "jointed_rings",
 )  # fmt: skip
 
 #: Numerical choices that a problem hands through to its scene, and the values that its ladder goes through.
