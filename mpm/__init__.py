@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from mpm.laws.law import register_soil_law, soil_law_names
     from mpm.laws.soil import Soil
     from mpm.mesh import Mesh
-    from mpm.meshing import build_mesh
+    from mpm.mesh.build import build_mesh
     from mpm.scene import Scene
     from mpm.simulation import Record, Simulation, simulate
     from mpm.solver import RunFailed, Solver
@@ -25,7 +25,7 @@ _HOMES = {
     "Simulation": "mpm.simulation",
     "Soil": "mpm.laws.soil",
     "Solver": "mpm.solver",
-    "build_mesh": "mpm.meshing",
+    "build_mesh": "mpm.mesh.build",
     "register_soil_law": "mpm.laws.law",
     "simulate": "mpm.simulation",
     "soil_law_names": "mpm.laws.law",

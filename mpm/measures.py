@@ -3,7 +3,7 @@
 import numpy as np
 
 from mpm.fields import numbers
-from mpm.half_model import with_mirrored_points
+from mpm.mesh.half import with_mirrored_points
 from mpm.points import mass_inside
 
 #: Displacement beyond which a point belongs to the flow zone, and to the disturbed zone [m].

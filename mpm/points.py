@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 
 from mpm.fields import POINT, record
+from mpm.initial_stress import set_initial_stress
 from mpm.laws.law import history_of, moduli_kernel
 from mpm.machine.compile import LINE, kernel
 
@@ -109,48 +110,13 @@ def fill(mesh, scene):
     points, element_of_point = on_cache_lines(points[by_element]), element_of_point[by_element]
     soil_of_point = soil_of_element[element_of_point].astype(np.int32)
     points["x_initial"], points["y_initial"] = points["x"], points["y"]
-    vertical, pressure = initial_stress(scene, -points["y"])
-    points["pore_pressure"] = pressure
-    points["stress_yy"] = -vertical
-    for number, soil in enumerate(scene.soils):
-        here = soil_of_point == number
-        points["stress_xx"][here] = -soil.lateral_pressure_coefficient(vertical[here]) * vertical[here]
-    points["stress_zz"] = points["stress_xx"]
-    for number, soil in enumerate(scene.soils):
-        mine = points[soil_of_point == number]
-        soil.initial_history(mine)
-        points[soil_of_point == number] = mine
+    set_initial_stress(scene, points, soil_of_point)
     return points, element_of_point, soil_of_point
 
 
 def _area(corners):
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     return 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
-
-
-def initial_stress(scene, depth):
-    """Vertical effective stress and pore pressure of level ground [Pa], compression positive.
-
-    Parameters
-    ----------
-    depth : (n,) float64
-        Depth below the ground surface [m].
-
-    Notes
-    -----
-    Without water the soil is dry. Else it is saturated throughout: above the table its water hangs at zero pressure.
-    """
-    g, water = scene.gravity, scene.water
-    water_density = water.density if water is not None else 0.0
-    total = np.zeros_like(depth)
-    tops = [s.top_depth for s in scene.soils] + [math.inf]
-    for soil, top, bottom in zip(scene.soils, tops[:-1], tops[1:], strict=True):
-        weight = g * ((1 - soil.porosity) * soil.grain_density + soil.porosity * water_density)
-        total += weight * np.clip(np.minimum(depth, bottom) - top, 0.0, None)
-    if water is None:
-        return total, np.zeros_like(depth)
-    pressure = g * water.density * np.clip(depth - water.table_depth, 0.0, None)
-    return total - pressure, pressure
 
 
 @cache

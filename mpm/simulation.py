@@ -13,7 +13,7 @@ import numpy as np
 
 from mpm.errors import errors, largest_so_far
 from mpm.fields import CLAMPS, values
-from mpm.meshing import build_mesh
+from mpm.mesh.build import build_mesh
 from mpm.pace.clock import ALMOST_ALL
 from mpm.solver import RunFailed, Solver
 from mpm.state import restore_solver, solver_state
@@ -35,7 +35,7 @@ class Record:
     tunnel with theta [degrees from the crown, clockwise], arc [m], soil_pressure (effective), water_pressure,
     soil_shear (clockwise traction on the lining) and the standard deviation of the first two within the interval;
     of a lining that moves also its displacement at the end, and of an elastic one its forces
-    (`mpm.walls.moving.MovingLinings.motion_at`).
+    (`mpm.walls.moving_lining.MovingLinings.motion_at`).
     `balances` are those of :meth:`mpm.Solver.balances`, `errors` those of :func:`mpm.errors.errors`.
     """
 

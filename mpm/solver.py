@@ -19,11 +19,11 @@ from mpm.fields import (
     TIED_RECORD,
     values,
 )
-from mpm.half_model import right_half
 from mpm.laws.law import laws_of, soil_table
 from mpm.machine.threads import Threads, check_threads
 from mpm.measures import Measures
-from mpm.pace.clock import END, LIMITS, NOW, ORIGIN, SPAN, Clock, Pace, critical_time_step
+from mpm.mesh.half import right_half
+from mpm.pace.clock import END, LIMITS, NOW, ORIGIN, SPAN, Clock, Pace, longest_time_step
 from mpm.pace.levels import element_levels, sorted_by_level, tie
 from mpm.pace.spectrum import Spectrum, spectral_time_step
 from mpm.pace.wave_speed import dry_wave_speed, fast_wave_speed
@@ -47,8 +47,8 @@ from mpm.step.substep import (
 )
 from mpm.step.system import Cuts, Ground, Layout, Medium, Needs, Net, System, Tally, Walls
 from mpm.tables import element_geometry, element_neighbours, outflow_nodes
-from mpm.walls.contact import FIXED_X, FIXED_Y
-from mpm.walls.moving import MovingLinings, NoJointEquilibrium
+from mpm.walls.gate import open_corners, shut_corners
+from mpm.walls.moving_lining import MovingLinings, NoJointEquilibrium
 from mpm.walls.nodes import contact_nodes, nodes_of_moving_linings
 from mpm.walls.sides import sides_of
 
@@ -83,7 +83,7 @@ def threads_used(elements, asked=None):
 
 
 class Solver(Measures):
-    """Two-phase MPM on a body-fitted triangle mesh; linings are held or move (`mpm.walls.moving`).
+    """Two-phase MPM on a body-fitted triangle mesh; linings are held or move (`mpm.walls.moving_lining`).
 
     Parameters
     ----------
@@ -258,7 +258,7 @@ class Solver(Measures):
         """Time step of the smallest elements that hold points [s] and the name of what limits it."""
         if not self._mapped:
             self.map_points()
-        dt, limit = critical_time_step(self._limits, self._pace)
+        dt, limit = longest_time_step(self._limits, self._pace)
         return dt * self._finest_step, LIMITS[limit]
 
     @property
@@ -332,14 +332,13 @@ class Solver(Measures):
         Without a gate in the scene the lining stays whole.
         """
         self.contact = self._contact_open
-        if self.scene.gate is not None and self.scene.gate.corners == "held":
-            self.fixed[self.mesh.corner_nodes] |= FIXED_X | FIXED_Y
+        open_corners(self.scene, self.mesh, self.fixed)
         self.gate_open = True
 
     def close_gate(self):
         """Put the plug back: what is in the channel stays there, and nothing follows through the face."""
         self.contact = self._contact_closed
-        self.fixed[self.mesh.corner_nodes] &= ~(FIXED_X | FIXED_Y)
+        shut_corners(self.mesh, self.fixed)
         self.gate_open = False
 
     def step(self, dt_max=math.inf):

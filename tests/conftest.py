@@ -27,7 +27,7 @@ from running import without_simulation
 import coupling
 import mpm
 from mpm.mesh import Mesh
-from mpm.meshing import build_mesh
+from mpm.mesh.build import build_mesh
 
 
 @pytest.fixture(scope="session")

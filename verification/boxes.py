@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from mpm.fields import values
-from mpm.meshing import crossed
+from mpm.mesh.build import crossed
 from mpm.scene import Numerics, Scene
 from mpm.walls.contact import FIXED_X, FIXED_Y
 

@@ -63,7 +63,7 @@ def init_command(
 
 def _values(scene):
     """Values of the base by the keys that are asked for, where it has them."""
-    from coupling.scenes.mistakes import entry_at
+    from coupling.scenes.mistake_lines import entry_at
 
     found, nested = {}, scene.nested()
     for name in QUESTIONS:

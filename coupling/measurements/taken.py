@@ -10,7 +10,7 @@ from coupling.datasets.geometry import has_tunnels, tunnel_list
 from coupling.datasets.open_run import Run
 from coupling.measurements.measurement import Measurement
 from coupling.measurements.quantities import QUANTITIES, computed
-from coupling.postprocess.inflow import crossing_times
+from coupling.postprocess.at_inflow import crossing_times
 from coupling.refused import Refused
 
 #: A time that is past the last record by no more than this share of it is that of the record.

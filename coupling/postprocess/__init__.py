@@ -5,6 +5,15 @@ the axes through the gate, the settlement trough, fields on the mesh, the heap i
 """
 
 from coupling.datasets.geometry import gate_diameter, gate_position, tunnels
+from coupling.postprocess.at_inflow import (
+    additional_at_inflow,
+    at_inflow,
+    by_inflow,
+    inflow_linearity,
+    pressure_ratio,
+    ratio_to_initial,
+    with_inflow,
+)
 from coupling.postprocess.elements import (
     element_areas,
     element_centres,
@@ -17,15 +26,6 @@ from coupling.postprocess.extremes import extremes
 from coupling.postprocess.flow_zone import Stages, flow_zone_stages
 from coupling.postprocess.ground_axes import arch, influence_distance, profile, stress_variation
 from coupling.postprocess.heap import filled, heap
-from coupling.postprocess.inflow import (
-    additional_at_inflow,
-    at_inflow,
-    by_inflow,
-    inflow_linearity,
-    pressure_ratio,
-    ratio_to_initial,
-    with_inflow,
-)
 from coupling.postprocess.settlement import share_within, surface_settlement, trough
 
 __all__ = [

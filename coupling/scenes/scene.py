@@ -28,7 +28,7 @@ from coupling.scenes.layers import (
     merged,
     parse_toml,
 )
-from coupling.scenes.mistakes import mistake_line
+from coupling.scenes.mistake_lines import mistake_line
 from coupling.scenes.plausibility import hints
 from coupling.scenes.rings import UNITS, derived_ring, in_si, number_of, ring_of
 from mpm.quantities import quantity_in

@@ -84,7 +84,7 @@ def at_inflow_masses(pressures, history, responses, masses, along="inflow_mass")
     import xarray as xr
 
     from coupling.datasets import BALANCES
-    from coupling.postprocess.inflow import crossing_times
+    from coupling.postprocess.at_inflow import crossing_times
     from coupling.postprocess.quality import quality
     from structure.limits import CHECK_VARIABLES
 

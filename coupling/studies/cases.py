@@ -98,7 +98,7 @@ def _value_in(scene, name):
 def _code() -> str:
     """Hash of the sources that decide a result: `mpm`, `structure`, and what turns a run into a case."""
     total = hashlib.sha256(FORMAT.encode())
-    ours = (f"coupling.{room}" for room in ("datasets", "responses", "runs", "postprocess.inflow", "studies.case"))
+    ours = (f"coupling.{room}" for room in ("datasets", "responses", "runs", "postprocess.at_inflow", "studies.case"))
     for package in ("mpm", "structure", *ours):
         origin = Path(find_spec(package).origin)
         for file in sorted(origin.parent.rglob("*.py")) if origin.name == "__init__.py" else [origin]:

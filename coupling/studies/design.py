@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 
 from coupling.refused import SceneError
 from coupling.scenes.layers import parse_toml, ready_names, text_of
-from coupling.scenes.mistakes import line_of
+from coupling.scenes.mistake_lines import line_of
 from coupling.scenes.scene import number_in_unit
 from coupling.studies.folder import STUDY_FILE
 from mpm.scene import Part

@@ -14,7 +14,7 @@ from multiprocessing.connection import Connection
 
 #: What a case needs and takes long to load; none of it starts a thread.
 LOADED = (
-    "coupling.runs.run", "coupling.studies.case", "mpm.meshing", "mpm.simulation", "structure.beams.lining",
+    "coupling.runs.run", "coupling.studies.case", "mpm.mesh.build", "mpm.simulation", "structure.beams.lining",
     "scipy.optimize", "gmsh", "meshio", "h5netcdf", "pint", "xarray", "dask.array",
 )  # fmt: skip
 INTERRUPTED, ALONE = 130, 131

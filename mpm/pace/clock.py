@@ -67,7 +67,7 @@ class Pace(NamedTuple):
 
 
 @kernel
-def critical_time_step(limits, pace):
+def longest_time_step(limits, pace):
     """Largest stable time step of level 0, from the limits of the parts of the mesh and the spectrum.
 
     Parameters
@@ -136,7 +136,7 @@ def plan_step(clock, pace, limits, start, occupied, n_occupied, element_cuts, le
 
     Parameters
     ----------
-    limits : (n, 2) float64, of `critical_time_step`
+    limits : (n, 2) float64, of `longest_time_step`
     start, occupied, n_occupied : of the points by element
     element_cuts, level_of_element : of :class:`mpm.pace.levels.Levels`
 
@@ -146,7 +146,7 @@ def plan_step(clock, pace, limits, start, occupied, n_occupied, element_cuts, le
         Number of steps of the finest level that holds points; place in `LIMITS`.
     """
     levels, times = clock.periods.size, clock.times
-    smallest, limit = critical_time_step(limits, pace)
+    smallest, limit = longest_time_step(limits, pace)
     finest = 1 << level_of_element[occupied[0]] if n_occupied > 0 else 1
     smallest *= finest
     points, periods = np.empty(levels, np.int64), np.empty(levels, np.int64)

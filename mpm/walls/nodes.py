@@ -1,13 +1,13 @@
 """Nodes of a lining: what pushes where, with the gate shut and open."""
 
-import math
 from types import SimpleNamespace
 
 import numpy as np
 
 from mpm.fields import CONTACT_RECORD
-from mpm.half_model import ring_factors, whole_ring
-from mpm.points import initial_stress
+from mpm.initial_stress import initial_stress
+from mpm.mesh.half import ring_factors, whole_ring
+from mpm.walls.gate import channel_nodes, corner_normals
 
 
 def contact_nodes(scene, mesh):
@@ -21,23 +21,15 @@ def contact_nodes(scene, mesh):
         of their impulses, and whether they bear with the gate open; moved_by: rows that move with each tunnel's lining.
     """
     node, closed, opened, active_closed, active_open, friction = [], [], [], [], [], []
-    lining = []
-    corner_angle = {}
+    lining, corners = [], corner_normals(scene, mesh)
     opening = set(mesh.opening_nodes.tolist()) if scene.gate is not None else set()
-    corners = mesh.corner_nodes.tolist() if scene.gate is not None else []
-    if scene.gate is not None:
-        a = math.radians(scene.gate.angle)
-        tangent = np.array([math.cos(a), -math.sin(a)])
-        # the corner on the smaller-angle side bounds the channel from below in angle
-        corner_angle = {i: side * tangent for i, side in zip(corners, mesh.corner_side.tolist(), strict=True)}
     for t, tunnel in enumerate(scene.tunnels):
-        axis = np.array([tunnel.x, -tunnel.axis_depth])
         outer = mesh.outer_nodes[t]
         first = len(node)
         for i, outward in zip(outer, balanced_normals(scene, mesh, outer), strict=True):
             node.append(i)
             closed.append(outward)
-            opened.append(corner_angle.get(int(i), outward))
+            opened.append(corners.get(int(i), outward))
             active_closed.append(True)
             active_open.append(int(i) not in opening)
             friction.append(tunnel.friction_coefficient)
@@ -51,25 +43,15 @@ def contact_nodes(scene, mesh):
         arc = 0.5 * (edge + np.roll(edge, 1))
         bears_open = np.array([int(i) not in opening and int(i) not in corners for i in outer])
         lining.append(SimpleNamespace(theta=theta, arc=arc, rows=rows, factors=factors, bears=bears_open))
-    if scene.gate is not None:
-        tunnel = scene.tunnels[scene.gate.tunnel]
-        axis = np.array([tunnel.x, -tunnel.axis_depth])
-        for i, side in zip(mesh.wall_nodes, mesh.wall_side, strict=True):
-            node.append(i)
-            closed.append(side * tangent)
-            opened.append(side * tangent)
-        for i in mesh.inner_nodes:
-            inward = (axis - mesh.nodes[i]) / np.linalg.norm(mesh.nodes[i] - axis)
-            node.append(i)
-            closed.append(inward)
-            opened.append(inward)
-        rest = len(node) - len(active_closed)
-        active_closed += [True] * rest
-        active_open += [True] * rest
-        friction += [tunnel.friction_coefficient] * rest
     rows = [part.rows for part in lining]
     if scene.gate is not None:
-        rows[scene.gate.tunnel] = np.r_[rows[scene.gate.tunnel], len(node) - rest : len(node)]
+        gated, (channel, inward) = scene.gate.tunnel, channel_nodes(scene, mesh)
+        rows[gated] = np.r_[rows[gated], len(node) : len(node) + len(channel)]
+        for listed, more in ((node, channel), (closed, inward), (opened, inward)):
+            listed.extend(more)
+        for listed in (active_closed, active_open):
+            listed.extend([True] * len(channel))
+        friction += [scene.tunnels[gated].friction_coefficient] * len(channel)
     records = {}
     for name, normals, active in (("closed", closed, active_closed), ("open", opened, active_open)):
         records[name] = np.zeros(len(node), CONTACT_RECORD)

@@ -12,7 +12,7 @@ import coupling
 from coupling import SceneError, datasets
 from coupling.files import checkpoint
 from coupling.runs.plan import plan, rough_plan
-from coupling.scenes.mistakes import line_of
+from coupling.scenes.mistake_lines import line_of
 from coupling.scenes.plausibility import warnings_of
 from verification.robustness import wild_scenes
 from verification.robustness.damaged_files import READERS, damaged, judged

@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from coupling import postprocess
-from coupling.postprocess.inflow import crossing_times
+from coupling.postprocess.at_inflow import crossing_times
 
 pytestmark = pytest.mark.slow
 

@@ -8,8 +8,8 @@ import pytest
 import coupling
 import mpm
 from mpm.fields import values
-from mpm.half_model import right_half, with_mirror_image
 from mpm.mesh import Mesh, areas
+from mpm.mesh.half import right_half, with_mirror_image
 from verification.small_event import COARSE, small_scene
 
 pytestmark = pytest.mark.slow

@@ -15,7 +15,8 @@ from coupling.report.trust import initial_theory
 from coupling.runs.plan import rough_plan
 from coupling.scenes.features import features, initial_k0
 from mpm.fields import values
-from mpm.points import fill, initial_stress
+from mpm.initial_stress import initial_stress
+from mpm.points import fill
 from verification.small_event import COARSE, small_scene
 
 pytestmark = pytest.mark.slow

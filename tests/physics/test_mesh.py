@@ -11,9 +11,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import coupling
-from mpm.element_size import element_size
 from mpm.mesh import CHANNEL, HEADROOM, INTERIOR, SOIL, Mesh, MeshError, altitudes, angles, areas
-from mpm.meshing import build_mesh
+from mpm.mesh.build import build_mesh
+from mpm.mesh.sizes import element_size
 from mpm.pace.levels import element_levels
 from mpm.scene import Scene
 

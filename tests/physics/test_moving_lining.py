@@ -12,7 +12,7 @@ import mpm.scene
 from mpm.fields import CONTACT_RECORD, block, numbers, values
 from mpm.state import restore_solver, solver_state
 from mpm.walls.contact import FIXED_X, FIXED_Y
-from mpm.walls.moving import STATE_RECORD, reaction_kernel
+from mpm.walls.moving_lining import STATE_RECORD, reaction_kernel
 from mpm.walls.rings import ElasticRing, RigidRing
 from verification.problems import exact_rings
 from verification.small_event import small_scene

@@ -9,14 +9,14 @@ from mpm.walls.contact import OPEN_X, OPEN_Y
 from verification.boxes import STRESS, box_mesh, box_scene, hold, inside, put, run_to, state
 from verification.driven import DrivenSolver
 from verification.loads import theory_pressures
-from verification.problems.problem import NUMERICS, WET, Problem, Result, register
-from verification.problems.two_phase import (
+from verification.problems.exact_two_phase import (
     NU,
     POROSITY,
     consolidation_with_inertia,
     constrained_modulus,
     terzaghi_series,
 )
+from verification.problems.problem import NUMERICS, WET, Problem, Result, register
 
 DRAINAGE = ("two-phase", "undrained")
 
@@ -149,7 +149,7 @@ def hydrostatics(size=0.35, size_growth=0.3, duration=0.05, points=3, lining="fi
     largest modulus allowed: it has no reason to move either, but for an ovalisation that changes pressures by 0.1 %.
     """
     import coupling
-    from mpm.meshing import build_mesh
+    from mpm.mesh.build import build_mesh
 
     scene = coupling.load_scene(
         "quick", gate="none", tunnels=[_rough_tunnel(lining)], lining=lining, stop={"time": duration},

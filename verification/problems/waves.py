@@ -8,8 +8,8 @@ from mpm.solver import Solver
 from verification.boxes import STRESS, box_mesh, box_scene, put, run_to, state
 from verification.monitor import kinetic_energy, strain_energy
 from verification.problems.columns import DRAINAGE, column
+from verification.problems.exact_two_phase import exact_velocities, modes
 from verification.problems.problem import NUMERICS, WET, Problem, Result, register
-from verification.problems.two_phase import exact_velocities, modes
 
 HEIGHT = 10.0  # [m]
 

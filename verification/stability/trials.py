@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from mpm.meshing import build_mesh
-from mpm.points import initial_stress
+from mpm.initial_stress import initial_stress
+from mpm.mesh.build import build_mesh
 from mpm.scene import Scene
 from mpm.solver import Solver
 from verification.boxes import (

@@ -15,7 +15,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from mpm.mesh import Mesh
+    from mpm.mesh.mesh import Mesh
 
 #: Variables of a point that change sign in the mirror.
 ODD = ("x", "velocity_solid_x", "velocity_liquid_x", "stress_xy", "displacement_x")

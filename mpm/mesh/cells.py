@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mpm.element_size import size_callback
 from mpm.machine.compile import kernel
-from mpm.mesh import MeshError
+from mpm.mesh.mesh import MeshError
+from mpm.mesh.sizes import size_callback
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from mpm.outline import Outline
+    from mpm.mesh.outline import Outline
     from mpm.scene import Scene
 
 # Area of a corner over the squared edge below which its stand-in is much larger than it.

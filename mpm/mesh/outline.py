@@ -1,6 +1,6 @@
 """The lines that cells must fit, divided into their edges, and the regular cells along the linings and in the channel.
 
-What lies between is filled by gmsh (`mpm.filling`) with cells of twice the size, which are cut into quarters: every
+What lies between is filled by gmsh (`mpm.mesh.cells`) with cells of twice the size, which are cut into quarters: every
 line between two of its fixed nodes therefore has an even number of edges.
 """
 
@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mpm.element_size import element_size, gate_size, headroom_height
-from mpm.mesh import CHANNEL, HEADROOM, INTERIOR, SOIL, MeshError
+from mpm.mesh.mesh import CHANNEL, HEADROOM, INTERIOR, SOIL, MeshError
+from mpm.mesh.sizes import element_size, gate_size, headroom_height
 from mpm.scene import Scene, Tunnel
 
 if TYPE_CHECKING:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mpm.element_size import element_size
-from mpm.filling import crossing, fill_faces, relax
-from mpm.half_model import with_mirror_image
-from mpm.mesh import Mesh, MeshError, altitudes
-from mpm.outline import Outline, draw_headroom, draw_scene, horizontal_lines
+from mpm.mesh.cells import crossing, fill_faces, relax
+from mpm.mesh.half import with_mirror_image
+from mpm.mesh.mesh import Mesh, MeshError, altitudes
+from mpm.mesh.outline import Outline, draw_headroom, draw_scene, horizontal_lines
+from mpm.mesh.sizes import element_size
 from mpm.scene import Scene, check_scene
 
 if TYPE_CHECKING:
