@@ -26,7 +26,7 @@ LININGS = {
     "jointed": ({"lining": "jointed"}, "own"),
     "jointed, joints gape and slide": ({"lining": "jointed", "ring": OPEN}, "own"),
 }
-MESHES = {"finer": 1.4, "coarse": 2.0}  # times the sizes of case 3
+MESHES = {"finer": 1.0, "coarse": 1.4}  # times the sizes of case 3
 SIZES = ("element_size", "element_size_lining", "element_size_interior", "size_growth")
 MASSES = (0.0, 100.0, 300.0, 1000.0)  # kg/m
 COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7")
