@@ -56,7 +56,7 @@ def test_dilatant_sand_reaches_rankine(dilatancy):
 @pytest.mark.parametrize("damping", [0.0, 0.3])
 def test_wall_without_dilatancy_stays_between_rankine_and_davis_whatever_the_driver_damps(name, damping):
     # 0.5 %: trend of the load over its last fifth; flutter that the driver damped once gave 1.09 Rankine
-    assert problems()[name].solve(cells=20, damping=damping).values["beyond"] < 0.005
+    assert problems()[name].solve(cells=14, damping=damping).values["beyond"] < 0.005
 
 
 def test_damping_of_the_stress_costs_what_kelvin_and_voigt_say():
