@@ -235,7 +235,7 @@ def _has_records(folder):
 
 def test_scenes_are_listed():
     result = gush("scenes", "--json", "-")
-    names = [row["name"] for row in json.loads(result.output)["scenes"]]
+    names = [row["name"] for row in json.loads(result.stdout)["scenes"]]
     assert names[0] == "quick" and {"case-1", "case-10", "twin-tunnels"} <= set(names)
 
 

@@ -301,7 +301,7 @@ def test_info_tells_what_a_file_is(folder, tmp_path):
     assert facts["inflow mass [kg/m]"] == 300.0 and facts["lining models"] == "beam-spring"
     shown = gush("info", folder)
     assert shown.exit_code == 0 and "inflow mass [kg/m]" in shown.output and "gush report" in shown.output
-    assert json.loads(gush("info", folder, "--json", "-").output)["kind"] == "run folder"
+    assert json.loads(gush("info", folder, "--json", "-").stdout)["kind"] == "run folder"
     (tmp_path / "cut.nc").write_bytes((folder / "run.nc").read_bytes()[:5000])
     for path, message in ((tmp_path / "none", "no such file"), (tmp_path / "cut.nc", "cannot be read")):
         refused = gush("info", path)

@@ -358,7 +358,7 @@ def test_rerun_repeats_a_run_bit_for_bit_and_says_so(whole, stopped, tmp_path):
     data = json.loads((tmp_path / "a.json").read_text())
     assert data["identical"] and data["changed"] == {} and data["records"] == data["records_run"] == 17
     partial = gush("rerun", stopped, "--out", tmp_path / "b", "--json", "-")
-    assert partial.exit_code == 0 and json.loads(partial.output)["records"] == 13
+    assert partial.exit_code == 0 and json.loads(partial.stdout)["records"] == 13
 
 
 def test_rerun_finds_the_last_bit_of_one_number(whole, tmp_path):

@@ -338,7 +338,7 @@ def test_only_an_earlier_report_is_replaced(run, tmp_path):
         assert refused.exit_code == 2 and message in refused.output
     assert (tmp_path / "mine.html").read_text() == "<p>mine</p>"
     done = CliRunner().invoke(app, ["report", str(run), "--out", str(path), "--json", "-"])
-    assert done.exit_code == 0 and json.loads(done.output)["bytes"] == path.stat().st_size < 3e6
+    assert done.exit_code == 0 and json.loads(done.stdout)["bytes"] == path.stat().st_size < 3e6
 
 
 def test_a_file_without_a_record_is_refused(tmp_path):

@@ -244,7 +244,7 @@ def test_report_with_pdf_prints_the_page_and_nothing_of_others(run, tmp_path, mo
     asked = ["report", str(run), "--out", str(tmp_path / "page.html"), "--pdf", "--json", "-"]
     printed = CliRunner().invoke(app, asked)
     assert printed.exit_code == 0, printed.output
-    pdf = Path(json.loads(printed.output)["pdf"])
+    pdf = Path(json.loads(printed.stdout)["pdf"])
     assert pdf == tmp_path / "page.pdf" and pages_of(pdf) <= 4
     pdf.write_bytes(b"%PDF-1.4 of somebody else")
     refused = CliRunner().invoke(app, asked)

@@ -155,7 +155,7 @@ def test_a_study_without_a_result_has_a_page_and_a_case_not_run_is_no_failure(fo
     written = page.write_report(begun).read_text(encoding="utf-8")
     assert "0 of 4 finished" in written and written.count("not run yet; repeat `gush study`") == 4
     told = CliRunner().invoke(app, ["info", str(folder), "--json", "-"])
-    facts = json.loads(told.output)
+    facts = json.loads(told.stdout)
     assert facts["kind"] == "study folder" and facts["facts"]["finished"] == 3 and facts["facts"]["failed"] == 1
 
 
@@ -165,7 +165,7 @@ def test_pages_of_the_runs_are_written_and_linked(folder, tmp_path):
     for file in sorted(copy.glob("cases/*/run/run.nc"))[1:]:
         file.unlink()
     done = CliRunner().invoke(app, ["report", str(copy), "--runs", "--json", "-"])
-    data = json.loads(done.output)
+    data = json.loads(done.stdout)
     assert data["study"] == str(copy) and len(data["runs"]) == 1 and data["bytes"] < 10e6
     links = re.findall(r'href="(cases/[^"]+/report.html)"', (copy / "report.html").read_text(encoding="utf-8"))
     assert sorted(str(copy / link) for link in links) == sorted(data["runs"])

@@ -95,7 +95,7 @@ def test_response_is_held_against_limits_of_a_file(written, tmp_path, backend):
     (tmp_path / "limits.toml").write_text(LIMITS)
     result = gush("respond", written, "--backend", backend, "--limits", tmp_path / "limits.toml", "--json", "-")
     assert result.exit_code == 0, result.output
-    data = json.loads(result.output)
+    data = json.loads(result.stdout)
     stored = xr.load_dataset(data["file"], engine="h5netcdf")
     # Straight from the definition: the larger change of the two diameters over 5 per mille of 6.6 m.
     change = np.maximum(np.abs(stored["convergence_horizontal"]), np.abs(stored["convergence_vertical"])).max().item()

@@ -93,7 +93,7 @@ def test_commands_answer_for_all_tunnels(run, tmp_path):
     copy = shutil.copytree(run, tmp_path / "run")
     done = gush("respond", copy, "--backend", "continuum", "--json", "-")
     assert done.exit_code == 0, done.output
-    data = json.loads(done.output)
+    data = json.loads(done.stdout)
     for tunnel, told in ((None, data), (0, data["tunnels"]["0"])):
         stored = read_response(copy, "continuum", tunnel)
         assert told["bending_moment"]["final"]["max"] == float(stored["bending_moment"].isel(time=-1).max())
