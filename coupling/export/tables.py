@@ -1,11 +1,10 @@
 """The numbers of a run as tables, CSV files or the sheets of one Excel file, in SI units named in their headings."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from coupling.datasets import read_run, structure_group
@@ -16,9 +15,6 @@ from coupling.postprocess.extremes import ring_extremes
 from coupling.refused import Refused
 from structure.limits import UTILISATIONS
 from structure.response import FORCES, PRESSURES, RESPONSE
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 EXCEL_FILE, LONGEST_SHEET = "tables.xlsx", 31
 #: Names of the tables; of lining models with the model behind, of tunnels without the gate with _tunnel_ and number.
@@ -32,8 +28,6 @@ def write_tables(run: Any, folder: Path, kind: str) -> list[Path]:
 
     run : coupling.datasets.open_run.OpenRun;  kind : "csv" or "xlsx".  Raises Refused: Excel without openpyxl.
     """
-    import pandas as pd
-
     found = run_tables(read_run(run))
     if kind == "csv":
         written = [folder / f"{name}.csv" for name in found]
@@ -116,8 +110,6 @@ def _place(at, prefix=""):
 
 
 def _answer(tree):
-    import pandas as pd
-
     return pd.DataFrame([
         {"tunnel": "with the gate" if tunnel is None else tunnel, "model": one.model, "quantity": extreme.name,
          "of it": extreme.kind, "unit": RESPONSE[extreme.name][1], "value": extreme.value, **_place(extreme.at),
@@ -127,8 +119,6 @@ def _answer(tree):
 
 
 def _limits(tree):
-    import pandas as pd
-
     return pd.DataFrame([
         {"tunnel": "with the gate" if tunnel is None else tunnel, "model": one.model, "limit": UTILISATIONS[name],
          "governing": name == one.governing, "largest utilisation": limit["largest"], **_place(limit["at"]),

@@ -1,17 +1,12 @@
 """Picture of a fit: parameters before and after measuring, what was measured, and bands of what follows."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
 from coupling.figures.picture import GATE, INITIAL, NOW, Picture, styled
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 COLUMNS = 3
 

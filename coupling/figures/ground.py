@@ -1,25 +1,20 @@
 """Pictures of the ground: fields on the points around a tunnel, the mesh around the gate."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection, PolyCollection
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
 from coupling.datasets.geometry import gate_of, tunnel_of
 from coupling.figures.picture import Picture, styled
 from coupling.figures.tunnel import draw_linings
 from coupling.postprocess.elements import cell_means, element_areas, element_of_points
 from coupling.postprocess.heap import filled
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from numpy.typing import NDArray
-
 
 FULL = 0.6  # of the area around an element that material fills where the element is drawn as a whole
 FIELD_COLOURS = ("viridis", "magma_r", "YlGnBu", "cividis")  # of displacement, strain, pore pressure, stress

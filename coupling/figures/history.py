@@ -1,13 +1,8 @@
 """Pictures of a run over time."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+import xarray as xr
 
 from coupling.figures.picture import GATE, NOW, SECOND, Picture, styled
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def inflow(history: xr.Dataset) -> Picture:

@@ -1,10 +1,7 @@
 """Every picture that a run has data for."""
 
-from __future__ import annotations
-
 import contextlib
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from coupling.datasets import (
     RunFileError,
@@ -17,6 +14,7 @@ from coupling.datasets import (
     structure_group,
 )
 from coupling.datasets.geometry import has_tunnels, tunnels_beside
+from coupling.datasets.open_run import Run
 from coupling.figures.comparison import forces_compared
 from coupling.figures.ground import fields_around_tunnel, mesh_near_gate
 from coupling.figures.history import inflow
@@ -26,9 +24,6 @@ from coupling.figures.settlement import settlement_trough
 from coupling.figures.tunnel import joints_of
 from coupling.figures.utilisations import checks
 from coupling.postprocess.answer import settled
-
-if TYPE_CHECKING:
-    from coupling.datasets.open_run import Run
 
 #: Names of the pictures; of tunnels without the gate they end in _tunnel_ and its number.
 NAMES = (

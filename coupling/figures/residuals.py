@@ -1,16 +1,10 @@
 """Pictures of a run against measurements."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
 
 from coupling.figures.picture import GATE, INITIAL, NOW, Picture, styled
 from coupling.measurements import QUANTITIES
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def residuals(misfit: xr.Dataset) -> Picture:

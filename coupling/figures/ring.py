@@ -1,13 +1,12 @@
 """Pictures of a lining: its pressures, its internal forces, its deformation."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from matplotlib.patches import Annulus
+from numpy.typing import NDArray
 
 from coupling.datasets.geometry import gate_of, gate_tunnel, on_tunnel
 from coupling.figures.picture import GATE, INITIAL, NOW, Picture, styled
@@ -15,10 +14,6 @@ from coupling.figures.polar import around_zero, at_time, closed_curve, crown_up,
 from coupling.figures.tunnel import joints_of, mark_gate, mark_joints
 from coupling.postprocess.extremes import extremes
 from structure.response import FORCES, SHOWN
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from numpy.typing import NDArray
 
 
 def pressures_polar(

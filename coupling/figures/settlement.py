@@ -1,16 +1,10 @@
 """The settlement trough and the Gauss curve of Peck through it."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
 
 from coupling.figures.picture import GATE, INITIAL, NOW, Picture, styled
 from coupling.postprocess.settlement import gauss
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 WIDTHS = 6.0  # at most half the width of the view, in widths i of the trough; it ends where the surface does
 MARGIN = 0.02  # of the view, on each side

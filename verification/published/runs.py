@@ -22,11 +22,10 @@ SOURCE_MESH = {"element_size": 0.75, "element_size_lining": 0.75, "element_size_
 def sizes(factor: float) -> dict:
     """Sizes of the mesh of case 3, all of them `factor` times as large."""
     from coupling.scenes.scene import load_scene
+    from verification.sensitivity.variants import meshes
 
-    mesh = load_scene("case-3").discretisation
-    names = ("element_size", "element_size_lining", "element_size_interior", "size_growth")
-    across = max(2, round(mesh.elements_across_gate / factor))
-    return {name: factor * getattr(mesh, name) for name in names} | {"elements_across_gate": across}
+    changes = meshes(load_scene("case-3"), factor)
+    return {name.removeprefix("discretisation."): value for name, value in changes.items()}
 
 
 def plans(quick: bool = False) -> list[dict]:
