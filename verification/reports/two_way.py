@@ -16,7 +16,7 @@ from coupling.figures import GATE
 from coupling.postprocess import at_inflow
 from structure.response import FORCES
 from verification.pages import DOCS, docs_page, made_by, picture, table
-from verification.published.runs import sizes
+from verification.sensitivity.variants import meshes
 
 OPEN = {"joint_contact_only": True, "joint_contact_height": 0.35, "joint_friction_coefficient": 0.5}
 #: What the ground is computed with: changes of case 3, and whether the forces are those of the ring in soil springs
@@ -35,7 +35,7 @@ COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7")
 def run_case(folder, factor, changes):
     """Run case 3 to the last mass with a lining, or go on with what is there; the folder."""
     scene = coupling.load_scene(
-        "case-3", discretisation=sizes(factor), stop={"inflow_mass": MASSES[-1], "time": 12.0},
+        "case-3", **meshes(coupling.load_scene("case-3"), factor), stop={"inflow_mass": MASSES[-1], "time": 12.0},
         output={"interval": 0.02, "snapshot_interval": 1.0, "points": False}, **changes,
     )  # fmt: skip
     there = (folder / "run.nc").is_file()
