@@ -4,8 +4,8 @@ import matplotlib
 import numpy as np
 from matplotlib.lines import Line2D
 
-from coupling.figures.picture import styled
-from coupling.figures.polar import around_zero, at_time, closed_curve, crown_up, legend_below
+from coupling.figures.picture import legend_outside, styled
+from coupling.figures.polar import around_zero, at_time, closed_curve, crown_up
 from coupling.figures.tunnel import joints_of, mark_joints
 from structure.response import FORCES, SHOWN
 
@@ -31,7 +31,7 @@ def forces_compared(responses):
                 axis = figure.add_subplot(grid[row, column], projection="polar")
                 _forces_panel(axis, responses, name, time)
                 axis.set_title(f"{SHOWN[name].label}\n{at_time(one.isel(time=time))}", pad=10)
-        legend_below(figure, figure.axes[0])
+        legend_outside(figure, figure.axes[0])
         for column, name in enumerate(FORCES):
             _differences_panel(figure.add_subplot(grid[-1, column]), responses, name, times)
     return figure

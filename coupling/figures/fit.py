@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
-from coupling.figures.picture import GATE, INITIAL, NOW, Picture, styled
+from coupling.figures.picture import GATE, INITIAL, NOW, Picture, legend_outside, styled
 
 COLUMNS = 3
 
@@ -31,8 +31,7 @@ def fit_bands(fit: xr.Dataset, names: list[str], shown: Callable[[str], tuple[st
             axis.spines[["top", "right"]].set_visible(False)
         for axis in axes[count:]:
             axis.set_visible(False)
-        handles, labels = axes[len(parameters) + 1].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=3)
+        legend_outside(figure, axes[len(parameters) + 1], "upper", 3)
     return figure
 
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import matplotlib
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 STYLE = {
@@ -40,3 +41,9 @@ def styled(width: float, height: float, layout: str | None = "constrained") -> I
     """A picture of so many inches, in the style of all while the block draws it."""
     with matplotlib.rc_context(STYLE):
         yield Picture(figsize=(width, height), layout=layout)
+
+
+def legend_outside(picture: Figure, axis: Axes, place: str = "lower", columns: int | None = None) -> None:
+    """The legend of an axis beside all of them, "lower" or "upper", in one row or so many columns."""
+    handles, labels = axis.get_legend_handles_labels()
+    picture.legend(handles, labels, loc=f"outside {place} center", ncols=columns or len(labels))

@@ -32,11 +32,6 @@ def around_zero(axis, *curves):
     radial_ticks(axis, None, 4)
 
 
-def legend_below(figure, axis):
-    handles, labels = axis.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
-
-
 def closed_curve(angle, values):
     return np.append(angle, angle[0] + 2 * np.pi), np.append(values, values[0])
 

@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from coupling.figures.picture import GATE, INITIAL, NOW, Picture, styled
+from coupling.figures.picture import GATE, INITIAL, NOW, Picture, legend_outside, styled
 from coupling.measurements import QUANTITIES
 
 
@@ -25,8 +25,7 @@ def residuals(misfit: xr.Dataset) -> Picture:
             values.set_ylabel(f"{name.replace('_', ' ')} [{shown.unit}]")
             chi_square = float(misfit["chi_square"].sel(quantity=name))
             left.set_title(f"χ² {chi_square:.3g} a measurement", loc="right")
-        handles, labels = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=2)
+        legend_outside(figure, axes[0, 0], "upper")
     return figure
 
 

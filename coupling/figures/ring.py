@@ -9,8 +9,8 @@ from matplotlib.patches import Annulus
 from numpy.typing import NDArray
 
 from coupling.datasets.geometry import gate_of, gate_tunnel, on_tunnel
-from coupling.figures.picture import GATE, INITIAL, NOW, Picture, styled
-from coupling.figures.polar import around_zero, at_time, closed_curve, crown_up, legend_below, radial_ticks
+from coupling.figures.picture import GATE, INITIAL, NOW, Picture, legend_outside, styled
+from coupling.figures.polar import around_zero, at_time, closed_curve, crown_up, radial_ticks
 from coupling.figures.tunnel import joints_of, mark_gate, mark_joints
 from coupling.postprocess.extremes import extremes
 from structure.response import FORCES, SHOWN
@@ -49,7 +49,7 @@ def pressures_polar(
                 mark_gate(axis, pressures)
             mark_joints(axis, joints)
             axis.set_title(SHOWN[name].label, pad=12)
-        legend_below(figure, axes[0])
+        legend_outside(figure, axes[0])
     return figure
 
 
@@ -85,7 +85,7 @@ def internal_forces(response: xr.Dataset, time: int = -1) -> Picture:
                 told.append(f"{kind} {value:.0f} at {at:.4g}°".replace("-", "\N{MINUS SIGN}"))
             axis.set_title(SHOWN[name].label, pad=10)
             axis.set_xlabel(",  ".join(told), labelpad=6)
-        legend_below(figure, axes[0])
+        legend_outside(figure, axes[0])
     return figure
 
 
@@ -145,7 +145,7 @@ def deformed_ring(response: xr.Dataset, time: int = -1) -> Picture:
             f"deformation, {factor:g} times enlarged (largest {1e3 * np.hypot(radial, tangential).max():.1f} mm)\n"
             "at the joints: rotation, and opening (+) or closing (\N{MINUS SIGN})"
         )
-        legend_below(figure, axis)
+        legend_outside(figure, axis)
     return figure
 
 

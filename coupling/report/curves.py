@@ -147,7 +147,7 @@ def ring_series(states):
             series |= {key: values.values for key, values in shape.items() if key != "inflow_mass"}
         if model.sizes.get("joint"):
             series["joint_dislocation_max"] = abs(model["joint_dislocation"]).max("joint").values
-        for name in UTILISATIONS.keys() & set(model.data_vars):
+        for name in (each for each in UTILISATIONS if each in model):
             largest = model[name].max([dim for dim in model[name].dims if dim != "progress"]).values
             series[name] = np.where(np.isfinite(largest), largest, np.nan)  # a chart has no infinity
         found.append(series | ({"settlement": model["settlement"].values} if "settlement" in model else {}))

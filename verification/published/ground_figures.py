@@ -9,7 +9,7 @@ from coupling import postprocess
 from coupling.datasets.geometry import tunnel_of
 from coupling.figures import GATE, INITIAL, NOW, SECOND
 from coupling.figures.ground import FIELD_COLOURS, frame_view
-from coupling.figures.picture import styled
+from coupling.figures.picture import legend_outside, styled
 from coupling.figures.tunnel import draw_linings
 from coupling.postprocess.elements import cell_means
 
@@ -168,5 +168,5 @@ def stresses_along_axes(horizontal, vertical, masses):
             axis.set_ylabel(title)
             axis.set_xlabel(f"{data.attrs['direction']} distance from the gate over D")
             axis.grid(True)
-        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=len(masses) + 1)
+        legend_outside(figure, axes[0, 0])
     return figure

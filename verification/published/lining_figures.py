@@ -5,7 +5,7 @@ import numpy as np
 from coupling import postprocess
 from coupling.datasets.geometry import gate_of
 from coupling.figures import GATE, INITIAL, NOW
-from coupling.figures.picture import styled
+from coupling.figures.picture import legend_outside, styled
 from coupling.figures.polar import around_zero, closed_curve, crown_up, radial_ticks
 from structure.response import FORCES, SHOWN
 from verification.published.ground_figures import mass_colours
@@ -53,12 +53,10 @@ def rings(panels, columns, gate=None, joints=(), heads=()):
             axis.set_title(head, pad=12)
         below = axes[-1] if heads else axes[-1][:1]
         for axis in below:
-            handles, labels = axis.get_legend_handles_labels()
             if heads:
-                below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.12), "ncols": 2}
-                axis.legend(handles, labels, fontsize=6.5, **below)
+                axis.legend(fontsize=6.5, loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2)
             else:
-                figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+                legend_outside(figure, axis)
     return figure
 
 
@@ -87,7 +85,7 @@ def initial_pressures(pressures, theory):
             axis.grid(True)
             axis.set_title(f"tunnel {k}" if len(tunnels) > 1 else "")
         axes[0].set_ylabel("pressure [kPa]")
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+        legend_outside(figure, axes[0], columns=2)
     return figure
 
 
@@ -156,6 +154,5 @@ def _over_inflow(panels):
             axis.set_ylabel(title)
             axis.set_xlabel("inflow mass [kg/m]")
             axis.grid(True)
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+        legend_outside(figure, axes[0])
     return figure

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.collections import PolyCollection
 
 from coupling.figures.comparison import forces_compared, joints_compared
+from coupling.figures.picture import legend_outside
 from coupling.responses.comparison import compare
 from coupling.scenes.scene import load_scene
 from structure import BeamSpringLining, Bolts, ContinuumLining, LiningFailure
@@ -151,8 +152,7 @@ def _draw_errors(curves):
             axis.set_title(f"{title}: largest error / extreme")
             axis.set_xlabel("CPU seconds for 50 times")
             axis.grid(True)
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=3)
+        legend_outside(figure, axes[0], columns=3)
 
 
 def joint_stresses(scene):

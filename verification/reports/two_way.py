@@ -13,6 +13,7 @@ import numpy as np
 import coupling
 from coupling.datasets import read_response
 from coupling.figures import GATE
+from coupling.figures.picture import legend_outside
 from coupling.postprocess import at_inflow
 from structure.response import FORCES
 from verification.pages import DOCS, docs_page, made_by, picture, table
@@ -101,7 +102,7 @@ def draw(path, found):
             ax.axvline(90.0, color=GATE, lw=1, ls=":")
         axes[0].set_ylabel("bending moment [kN m/m]")
         axes[2].set(title="largest and smallest", xlabel="inflow [kg/m]")
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+        legend_outside(figure, axes[0], columns=2)
 
 
 def main(runs):
