@@ -192,4 +192,5 @@ def relax(solver, friction, tolerance, max_steps, progress=None):
     if s.moving is not None:
         s.moving.halt()
         s.moving.remember()
+        s.moving.check()
     return step, residual, reaction

@@ -48,7 +48,7 @@ from mpm.step.substep import (
 from mpm.step.system import Cuts, Ground, Layout, Medium, Needs, Net, System, Tally, Walls
 from mpm.tables import element_geometry, element_neighbours, outflow_nodes
 from mpm.walls.gate import open_corners, shut_corners
-from mpm.walls.moving_lining import MovingLinings, NoJointEquilibrium
+from mpm.walls.moving_lining import MovingLinings, LiningLost
 from mpm.walls.nodes import contact_nodes, nodes_of_moving_linings
 from mpm.walls.sides import sides_of
 
@@ -317,7 +317,7 @@ class Solver(Measures):
 
     def _relax(self, friction, progress):
         numerics = self.scene.numerics
-        with self._joints_in_equilibrium():
+        with self._linings_followed():
             steps, residual, self.impulse[:] = relaxation.relax(
                 self, friction, numerics.relaxation_tolerance, numerics.max_relaxation_steps, progress
             )
@@ -424,16 +424,18 @@ class Solver(Measures):
         self._run(PLAN, PLAN, batch)
         substeps = batch.substeps[0]
         for k in range(substeps):
-            with self._joints_in_equilibrium():
+            with self._linings_followed():
                 self.moving.advance(self.system(), float(self.clock.dt_of_level[0]))  # that of all nodes on them
             self._run(SOLVE, UPDATE, Batch.one_substep(k, substeps))
+        with self._linings_followed():
+            self.moving.check()
 
     @contextmanager
-    def _joints_in_equilibrium(self):
-        """Say where and when the joints of a moving lining found none."""
+    def _linings_followed(self):
+        """Say where and when a moving lining can not be followed any further."""
         try:
             yield
-        except NoJointEquilibrium as problem:
+        except LiningLost as problem:
             raise RunFailed(
                 str(problem), self.clock.time, self.mesh.nodes[self.mesh.outer_nodes[problem.tunnel]].mean(axis=0)
             ) from problem

@@ -176,18 +176,17 @@ class ReducedRing:
         """
         ways, unslipped, beyond = 3 * self.law.count, np.zeros_like(slip), np.zeros_like(free)
         beyond[1:ways:3] = slip  # forces follow what is beyond the slip: its size brings no rounding
-        free, moved, around = free - beyond, start - beyond, np.linalg.inv(flexibility)
-        stiffness, magnitudes = around.diagonal(), np.abs(around)
+        free, moved, stiffness = free - beyond, start - beyond, 1 / flexibility.diagonal()
         least, share, step, both = np.inf, 1.0, np.zeros_like(free), np.zeros_like(free)
         for _ in range(MAX_ITERATIONS):
             force, tangent, more = self.joint_forces(moved, unslipped)
-            left = around @ (free - moved) - force
-            terms = magnitudes @ (np.abs(free) + np.abs(moved)) + np.abs(tangent) @ np.abs(moved) + np.abs(force)
-            if np.all(np.abs(left) <= ROUNDINGS * EPSILON * terms):
+            apart = free - moved - flexibility @ force
+            terms = np.abs(free) + np.abs(moved) + np.abs(flexibility) @ (np.abs(force) + np.abs(tangent) @ np.abs(moved))
+            if np.all(np.abs(apart) <= ROUNDINGS * EPSILON * terms):
                 return force, slip + more
-            missed = np.sum(left**2 / stiffness)
+            missed = np.sum(stiffness * apart**2)
             if missed < least or share < SMALLEST_SHARE:
-                change = np.linalg.solve(around + tangent, left)
+                change = np.linalg.solve(np.eye(len(free)) + flexibility @ tangent, apart)
                 both, step = force + stiffness * moved, stiffness * change + tangent @ change
                 least, share = missed, 1.0
             else:  # joints that turn or slide back and forth: half the way
@@ -196,7 +195,7 @@ class ReducedRing:
             moved[:ways] = self.law.between(tried[:ways].reshape(-1, 3), stiffness[:ways].reshape(-1, 3)).ravel()
             if self.bolt_law is not None:
                 moved[ways:] = self.bolt_law.between(tried[ways:], stiffness[ways:])
-        raise NoEquilibrium(f"joints are {np.abs(left).max():.3g} N/m out of balance after {MAX_ITERATIONS} iterations")
+        raise NoEquilibrium(f"joints are {np.abs(apart).max():.3g} m apart after {MAX_ITERATIONS} iterations")
 
     def internal_forces(self, displacement: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """N, Q [N/m] and M [N m/m] at theta [rad], (n,) float64 each; signs: `structure.response`."""

@@ -24,6 +24,7 @@ from mpm.walls.contact import Masses, Pair, response_kernel
 from mpm.walls.rings import ElasticRing, RigidRing, effective_mass
 
 MAX_ITERATIONS = 100
+LARGEST_DISPLACEMENT = 0.1  # of the outer radius, that is still small
 SMALLEST_SHARE = 1e-3  # of Newton's step
 TOLERANCE = 1e-11  # of the largest term of an equation: round-off of its sum
 
@@ -195,15 +196,12 @@ def ring_impulse(stiffness, weight, displacement, dt, due):
         due[i] = dt * force
 
 
-class NoJointEquilibrium(ArithmeticError):
-    """Joints whose forces could not be found in a step, of a `tunnel`."""
+class LiningLost(ArithmeticError):
+    """A lining of a `tunnel` that can not be followed any further; the message says why."""
 
-    def __init__(self, tunnel):
+    def __init__(self, tunnel, why):
         self.tunnel = tunnel
-        super().__init__(
-            f"the joints of tunnel {tunnel} found no equilibrium with their ring and the ground: lower "
-            "ring.joint_rotational_stiffness, or leave joint_contact_height out"
-        )
+        super().__init__(why)
 
 
 class MovingLinings:
@@ -318,7 +316,11 @@ class MovingLinings:
         try:
             force, remembered = part.ring.joints_between(flexibility, apart, near, part.memory)
         except ArithmeticError as problem:
-            raise NoJointEquilibrium(part.tunnel) from problem
+            raise LiningLost(
+                part.tunnel,
+                f"the joints of tunnel {part.tunnel} found no equilibrium with their ring and the ground: lower "
+                "ring.joint_rotational_stiffness, or leave joint_contact_height out",
+            ) from problem
         return free - dt * _times(answers, force), force, remembered
 
     def settle(self, force, held_liquid, mass, velocity, contact):
@@ -361,6 +363,19 @@ class MovingLinings:
             energy += float(np.sum(part.velocity * momentum))
             unbalanced += float(np.sum(np.einsum("ij,j->i", ring_mass, part.velocity - before) ** 2))
         return energy, unbalanced
+
+    def check(self):
+        """Raise LiningLost where displacements are not small any more: mesh and equations are those of the circle."""
+        for part in self.parts:
+            moved = np.hypot(*np.einsum("kdm,m->dk", part.motion, part.displacement)).max()
+            most = LARGEST_DISPLACEMENT * part.ring.outer_radius
+            if not moved <= most:
+                raise LiningLost(
+                    part.tunnel,
+                    f"the lining of tunnel {part.tunnel} has moved by {moved:.3g} m, beyond {most:.3g} m (a tenth of "
+                    "its outer radius), where displacements are no longer small: raise the stiffness of joints that"
+                    " give way (ring), make it less heavy or light (lining_density), or hold it (lining = 'fixed')",
+                )
 
     def halt(self):
         """Bring the rings to rest where they are."""
