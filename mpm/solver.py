@@ -48,7 +48,7 @@ from mpm.step.substep import (
 from mpm.step.system import Cuts, Ground, Layout, Medium, Needs, Net, System, Tally, Walls
 from mpm.tables import element_geometry, element_neighbours, outflow_nodes
 from mpm.walls.gate import open_corners, shut_corners
-from mpm.walls.moving_lining import MovingLinings, LiningLost
+from mpm.walls.moving_lining import LiningLost, MovingLinings
 from mpm.walls.nodes import contact_nodes, nodes_of_moving_linings
 from mpm.walls.sides import sides_of
 

@@ -181,7 +181,9 @@ class ReducedRing:
         for _ in range(MAX_ITERATIONS):
             force, tangent, more = self.joint_forces(moved, unslipped)
             apart = free - moved - flexibility @ force
-            terms = np.abs(free) + np.abs(moved) + np.abs(flexibility) @ (np.abs(force) + np.abs(tangent) @ np.abs(moved))
+            terms = (
+                np.abs(free) + np.abs(moved) + np.abs(flexibility) @ (np.abs(force) + np.abs(tangent) @ np.abs(moved))
+            )
             if np.all(np.abs(apart) <= ROUNDINGS * EPSILON * terms):
                 return force, slip + more
             missed = np.sum(stiffness * apart**2)

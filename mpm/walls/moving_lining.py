@@ -24,7 +24,7 @@ from mpm.walls.contact import Masses, Pair, response_kernel
 from mpm.walls.rings import ElasticRing, RigidRing, effective_mass
 
 MAX_ITERATIONS = 100
-LARGEST_DISPLACEMENT = 0.1  # of the outer radius, that is still small
+LARGEST_JUMP = 0.1  # of a joint over the outer radius, that is still small
 SMALLEST_SHARE = 1e-3  # of Newton's step
 TOLERANCE = 1e-11  # of the largest term of an equation: round-off of its sum
 
@@ -365,16 +365,17 @@ class MovingLinings:
         return energy, unbalanced
 
     def check(self):
-        """Raise LiningLost where displacements are not small any more: mesh and equations are those of the circle."""
+        """Raise LiningLost where joints move so far that displacements are not small any more."""
         for part in self.parts:
-            moved = np.hypot(*np.einsum("kdm,m->dk", part.motion, part.displacement)).max()
-            most = LARGEST_DISPLACEMENT * part.ring.outer_radius
+            radius = part.ring.outer_radius
+            jumps = getattr(part.ring, "jumps", np.zeros((0, 3, len(part.displacement)))) @ part.displacement
+            moved, most = np.abs(jumps * [1.0, 1.0, radius]).max(initial=0.0), LARGEST_JUMP * radius
             if not moved <= most:
                 raise LiningLost(
                     part.tunnel,
-                    f"the lining of tunnel {part.tunnel} has moved by {moved:.3g} m, beyond {most:.3g} m (a tenth of "
-                    "its outer radius), where displacements are no longer small: raise the stiffness of joints that"
-                    " give way (ring), make it less heavy or light (lining_density), or hold it (lining = 'fixed')",
+                    f"a joint of tunnel {part.tunnel} opens, slides or turns by {moved:.3g} m, beyond {most:.3g} m (a "
+                    "tenth of the outer radius), where displacements are no longer small: raise the stiffness or the "
+                    "friction of the joints in [ring], or choose lining = 'elastic'",
                 )
 
     def halt(self):
