@@ -8,13 +8,16 @@ from verification.accuracy.orders import excess_over_front, observed_order, pare
 from verification.problems.problem import Problem, Result
 
 #: Settings that count something: their mesh size or time step is one over the value.
-COUNTS = ("cells", "elements", "columns", "rows", "across", "steps", "increments", "points_per_element", "points")
+COUNTS = (
+    "cells", "elements", "columns", "rows", "across", "around", "steps", "increments", "points_per_element", "points",
+)  # fmt: skip
 #: Settings that are a mesh size or a time step.
 SIZES = ("size", "element_size", "spacing", "courant", "dt", "time_step")
 #: Settings of verification problems that pose another problem.
 POSED = (
-    "aspect", "conductivity", "duration", "friction", "height", "inertia", "periods", "repose", "rough", "rough_base",
-    "settlement", "share", "slope", "stiffness", "strain", "time_factor", "times", "turn", "cover", "release", "mode",
+    "aspect", "bonded", "conductivity", "cover", "duration", "friction", "height", "inertia", "mode", "periods",
+    "release", "repose", "rotational_stiffness", "rough", "rough_base", "settlement", "share", "slope", "stiffness",
+    "strain", "time_factor", "times", "turn",
 )  # fmt: skip
 #: Errors at or below this are round-off: nothing can be gained there.
 ROUND_OFF = 1e-12
@@ -86,9 +89,11 @@ def assess(rows: Iterable[dict]) -> dict:
 
 def physical_settings() -> set[str]:
     """Names of settings that pose another problem and are no numerical choice; K_w is both and stays out."""
-    from mpm.scene import Soil, Water
+    from mpm.laws.law import built_in_laws
+    from mpm.scene import Water
 
-    return {*Soil.model_fields, *Water.model_fields, *POSED} - {"bulk_modulus"}
+    of_soils = {name for law in built_in_laws() for name in law.model_fields}
+    return {*of_soils, *Water.model_fields, *POSED} - {"bulk_modulus"}
 
 
 def dataset(rows: Iterable[dict]):

@@ -110,7 +110,7 @@ def undrained_shear(steps=100, strain=0.1, overconsolidation_ratio=1.0, **settin
     (p, q), seconds = (lambda found: (found[0].T, found[1]))(timed(run))
     end = slope * start * overconsolidation_ratio**share * 0.5**share
     eta_of_yield = slope * math.sqrt(overconsolidation_ratio - 1)
-    yields = np.maximum.accumulate(q / p) >= eta_of_yield * (1 - 1e-6)  # from the first time on
+    yields = np.maximum.accumulate(np.abs(p / start - 1)) > 1e-12  # elastic clay keeps p: from the first change on
     at_yield = start * ((slope**2 + eta_of_yield**2) / (slope**2 + (q / p) ** 2)) ** share
     path = np.abs(p / np.where(yields, at_yield, start) - 1).max()
     return Result(float(max(path, abs(q[-1] / end - 1))), {"strength": q[-1] / 2}, steps, 1, seconds)
