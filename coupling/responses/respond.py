@@ -11,7 +11,7 @@ from coupling.datasets.geometry import on_tunnel, tunnels_beside
 from coupling.files.provenance import origin, with_history
 from coupling.refused import Refused, SceneError
 from coupling.responses.source import Source
-from coupling.scenes.rings import gate_tunnel, limits_at, ring_of
+from coupling.scenes.rings import answering_ring, gate_tunnel, limits_at
 from coupling.scenes.scene import Scene
 from structure import Limits, check, lining_model
 from structure.lining import at_whole_degrees
@@ -30,7 +30,7 @@ def respond(scene: Scene, pressures: xr.Dataset, backend: str = "beam-spring", t
     number = gate_tunnel(scene) if tunnel is None else tunnel
     pressures = on_tunnel(pressures, number)
     try:
-        ring = ring_of(scene, number)
+        ring = answering_ring(scene, number)
     except SceneError as problem:
         raise Refused(str(problem)) from None
     return with_checks(respond_by_name(ring, pressures, backend), limits_at(scene, number, scene.limits))

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from coupling.datasets import RunFileError, opened, run_file
 from coupling.datasets.geometry import on_tunnel, tunnels_beside
 from coupling.refused import SceneError
-from coupling.scenes.rings import gate_tunnel, limits_at, ring_of
+from coupling.scenes.rings import answering_ring, gate_tunnel, limits_at
 from coupling.scenes.scene import Scene, load_scene, parse_scene
 from structure.inputs import mistakes, refusal
 from structure.limits import Limits
@@ -94,7 +94,7 @@ def _ring(file, root, scene, tunnel):
     if scene is not None:
         if scene.ring is None:
             raise RunFileError(f"'{file}': scene '{scene.name}' has no [ring]; choose another --scene")
-        return scene.ring if tunnel is None else ring_of(scene, tunnel)
+        return answering_ring(scene, gate_tunnel(scene) if tunnel is None else tunnel)
     if "ring" not in root.attrs:
         raise RunFileError(
             f"'{file}': needs a ring, got neither a scene nor the attribute 'ring'; give --scene, e.g. --scene case-3,"

@@ -49,7 +49,7 @@ def features(scene: Scene, threads: int, why_alone: str = "one thread") -> list[
     kept = kept if output.points else "pressures and history only: output.points = false"
     part("snapshots of the points", output.points, kept)
     part("several threads", threads > 1, f"{threads} threads" if threads > 1 else why_alone)
-    answer = f"beam-spring, {len(ring.joint_angles)} joints" if ring else "the scene has no [ring]"
+    answer = f"beam-spring, {len(ring.joint_angles)} joints{_springs(scene)}" if ring else "the scene has no [ring]"
     part("ring response", ring is not None, answer)
     told = scene.limits.in_words if scene.limits else "the scene has no [limits]"
     part("limits of the lining", scene.limits is not None, told)
@@ -156,6 +156,15 @@ def _why_half(s):
     if s.is_half:
         return "the scene is its own mirror image: x >= 0 is computed, results are of the whole"
     return s.asymmetry or "symmetry = 'whole'; 'auto' would compute x >= 0 only"
+
+
+def _springs(s):
+    """What stands for the ground under a ring that answers pressures, where the lining has given way already."""
+    kinds = {s.lining_of(tunnel) for tunnel in s.tunnels}
+    if "jointed" in kinds:
+        return "; a jointed lining has given way to the ground: no soil springs"
+    twice = "; soil springs count twice what an elastic lining gave way: see its own forces in /lining"
+    return twice if "elastic" in kinds else ""
 
 
 def _linings(s):
