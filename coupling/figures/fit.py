@@ -4,9 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 import xarray as xr
-from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
-from coupling.figures.picture import GATE, INITIAL, NOW, Picture, legend_outside, styled
+from coupling.figures.picture import GATE, INITIAL, NOW, Picture, legend_outside, logarithmic_axis, styled
 
 COLUMNS = 3
 
@@ -46,10 +45,7 @@ def _parameter(axis, fit, name):
     axis.hist(values, edges, color=NOW, alpha=0.75)
     axis.axvspan(prior[0], prior[-1], ymax=0.03, color=INITIAL)
     if logarithmic:
-        axis.set_xscale("log")
-        axis.xaxis.set_major_locator(LogLocator(subs=(1, 3)))
-        axis.xaxis.set_major_formatter(LogFormatterSciNotation(labelOnlyBase=False, minor_thresholds=(np.inf, np.inf)))
-        axis.xaxis.set_minor_formatter(NullFormatter())
+        logarithmic_axis(axis.xaxis)
     unit = str(one["unit_of_parameter"].values)
     axis.set_xlabel(name if unit == "1" else f"{name} [{unit}]")
     axis.set_yticks([])

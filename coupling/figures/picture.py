@@ -1,12 +1,15 @@
 """How pictures look, and the figure that they are drawn on."""
 
 import io
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import matplotlib
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
 STYLE = {
     "font.size": 8,
@@ -41,6 +44,15 @@ def styled(width: float, height: float, layout: str | None = "constrained") -> I
     """A picture of so many inches, in the style of all while the block draws it."""
     with matplotlib.rc_context(STYLE):
         yield Picture(figsize=(width, height), layout=layout)
+
+
+def logarithmic_axis(axis: Axis) -> None:
+    """Scale of an axis that is drawn on already, with labels that do not overlap: at 1 and 3 of few decades."""
+    getattr(axis.axes, f"set_{axis.axis_name}scale")("log")
+    low, high = axis.get_view_interval()
+    axis.set_major_locator(LogLocator(subs=(1, 3) if high < 1e4 * low else (1,)))
+    axis.set_major_formatter(LogFormatterSciNotation(labelOnlyBase=False, minor_thresholds=(math.inf, math.inf)))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def legend_outside(picture: Figure, axis: Axes, place: str = "lower", columns: int | None = None) -> None:

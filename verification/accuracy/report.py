@@ -4,6 +4,7 @@ import difflib
 import math
 from pathlib import Path
 
+from coupling.figures.picture import logarithmic_axis
 from coupling.refused import Refused
 from verification.accuracy.ladders import assess, dataset, measure
 from verification.pages import Page, made_by, picture, provenance, table
@@ -91,15 +92,17 @@ def draw(problem, rows, path):
         axes = figure.subplots()
         for setting in dict.fromkeys(row["setting"] for row in rows if row["value"] is not None):
             mine = [row for row in rows if row["setting"] == setting and math.isfinite(row["error"])]
-            mine = sorted((row["cpu_seconds"], _shown(row["error"]), str(row["value"])) for row in mine)
+            mine = sorted((row["cpu_seconds"], _shown(row["error"]), _value(row["value"])) for row in mine)
             (line,) = axes.plot([m[0] for m in mine], [m[1] for m in mine], "o-", ms=3.5, lw=1, label=setting)
             for seconds, error, value in mine:
+                if value == _value(problem.fast.get(setting)):
+                    continue  # the default, at the ring
                 axes.annotate(value, (seconds, error), (4, 3), textcoords="offset points", fontsize=6.5,
                               color=line.get_color())  # fmt: skip
         place = rows[0]["cpu_seconds"], _shown(rows[0]["error"])
         axes.plot(*place, "o", ms=9, mfc="none", mec="black", label="default")
-        axes.set_xscale("log")
-        axes.set_yscale("log")
+        logarithmic_axis(axes.xaxis)
+        logarithmic_axis(axes.yaxis)
         axes.set_xlabel("processor time of stepping [s]")
         axes.set_ylabel(f"error: {problem.norm}" if len(problem.norm) < 40 else "error [-]")
         axes.set_title(problem.title)
@@ -123,6 +126,10 @@ def overview(summary, path):
         error.set_xlabel("error in the problem's norm [-]")
         error.legend(fontsize=7, loc="lower left")
         cost.set_xlabel("processor time of stepping [s]")
+
+
+def _value(value):
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _shown(error):
