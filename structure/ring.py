@@ -178,9 +178,9 @@ class Ring(Input):
         A lining held fixed while its pressures are taken carries their vertical resultant (buoyancy less weight).
         True: that resultant is balanced at every time by a radial soil pressure a cos(theta) on the outer face, as
         much more at the crown as less at the invert. False: soil springs (or the support) carry it.
-    support : {"free", "invert"}
+    support : {"free", "invert", "inertia"}
         "invert": the ring is clamped at the node next to its invert, as in a test stand. "free": only the ground
-        holds it.
+        holds it. "inertia": what loads leave over is spread evenly around the ring, as by one that moves.
     n_elements : int
         Straight beam elements around the ring.
     section : {"timoshenko", "euler-bernoulli"}
@@ -207,7 +207,7 @@ class Ring(Input):
     neighbour: Neighbour | None = None
     ground: Ground | None = None
     balance_uplift: bool = False
-    support: Literal["free", "invert"] = "free"
+    support: Literal["free", "invert", "inertia"] = "free"
     n_elements: int = Field(default=360, ge=24, le=20000)
     section: Literal["timoshenko", "euler-bernoulli"] = "timoshenko"
 
@@ -230,8 +230,8 @@ class Ring(Input):
         self._check_joints()
         if self.neighbour is not None and not self.joint_angles:
             raise ValueError("neighbour: must be left out of a ring without joints, got one; all rings are alike")
-        if self.support == "invert" and self.ground is not None:
-            raise ValueError("support must be 'free' where there is ground, got 'invert'; remove one of the two")
+        if self.support != "free" and self.ground is not None:
+            raise ValueError(f"support must be 'free' where there is ground, got {self.support!r}; remove one of them")
         return self
 
     def unusual(self) -> dict[str, str]:

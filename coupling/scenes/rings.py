@@ -118,13 +118,13 @@ def ring_of(scene: Scene, tunnel: int) -> Ring:
 def answering_ring(scene: Scene, tunnel: int) -> Ring:
     """The ring of a tunnel as it answers the pressures there: of a jointed lining alone, without soil springs.
 
-    It has given way to the ground already, whose answer is in the pressures: springs would count it twice. What little
-    is left out of balance while it moves its invert bears. Raises SceneError: as :func:`ring_of`.
+    It has given way to the ground already, whose answer is in the pressures: springs would count it twice. What is
+    left out of balance accelerates it. Raises SceneError: as :func:`ring_of`.
     """
     ring = ring_of(scene, tunnel)
     if ring.ground is None or not scene.tunnels or scene.lining_of(scene.tunnels[tunnel]) != "jointed":
         return ring
-    return ring.model_copy(update={"ground": None, "support": "invert"})
+    return ring.model_copy(update={"ground": None, "support": "inertia"})
 
 
 def limits_at(scene: Scene, tunnel: int, limits: Limits | None) -> Limits | None:
