@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 
 from mpm.fields import POINT, record
-from mpm.initial_stress import set_initial_stress
+from mpm.k0_procedure import set_initial_stress
 from mpm.laws.law import history_of, moduli_kernel
 from mpm.machine.compile import LINE, kernel
 

@@ -192,9 +192,9 @@ class Numerics(Part):
         waves that flow without dilatancy feeds.
     critical_step : str
         Where the critical time step comes from: "altitude" of the elements over the wave speed, or "spectral", the
-        largest eigenvalue of the points on their mesh, renewed now and then (`mpm.pace.spectrum`).
+        largest eigenvalue of the points on their mesh, renewed now and then (`mpm.time_step.spectrum`).
     local_time_stepping : bool
-        Groups of elements take steps of their own, powers of two times the smallest (`mpm.pace.levels`).
+        Groups of elements take steps of their own, powers of two times the smallest (`mpm.time_step.levels`).
     """
 
     courant: float = Field(default=0.8, gt=0, le=1)

@@ -14,9 +14,9 @@ import numpy as np
 from mpm.errors import errors, largest_so_far
 from mpm.fields import CLAMPS, values
 from mpm.mesh.build import build_mesh
-from mpm.pace.clock import ALMOST_ALL
 from mpm.solver import RunFailed, Solver
 from mpm.state import restore_solver, solver_state
+from mpm.time_step.clock import ALMOST_ALL
 
 if TYPE_CHECKING:
     from mpm.mesh import Mesh

@@ -23,10 +23,6 @@ from mpm.laws.law import laws_of, soil_table
 from mpm.machine.threads import Threads, check_threads
 from mpm.measures import Measures
 from mpm.mesh.half import right_half
-from mpm.pace.clock import END, LIMITS, NOW, ORIGIN, SPAN, Clock, Pace, longest_time_step
-from mpm.pace.levels import element_levels, sorted_by_level, tie
-from mpm.pace.spectrum import Spectrum, spectral_time_step
-from mpm.pace.wave_speed import dry_wave_speed, fast_wave_speed
 from mpm.points import extremes_kernel, fill
 from mpm.scene import check_scene
 from mpm.step.cells import fill_cells
@@ -47,6 +43,10 @@ from mpm.step.substep import (
 )
 from mpm.step.system import Cuts, Ground, Layout, Medium, Needs, Net, System, Tally, Walls
 from mpm.tables import element_geometry, element_neighbours, outflow_nodes
+from mpm.time_step.clock import END, LIMITS, NOW, ORIGIN, SPAN, Clock, Pace, longest_time_step
+from mpm.time_step.levels import element_levels, sorted_by_level, tie
+from mpm.time_step.spectrum import Spectrum, spectral_time_step
+from mpm.time_step.wave_speed import dry_wave_speed, fast_wave_speed
 from mpm.walls.gate import open_corners, shut_corners
 from mpm.walls.moving_lining import LiningLost, MovingLinings
 from mpm.walls.nodes import contact_nodes, nodes_of_moving_linings

@@ -102,7 +102,7 @@ def _work(solver, dt, interval, time):
 
 def _work_within(solver, steps):
     """The same within one interval, `steps` times the critical step of the smallest elements long."""
-    from mpm.pace.clock import choose_periods
+    from mpm.time_step.clock import choose_periods
 
     points = np.diff(solver.start[solver.levels.element_cuts]).astype(np.int64)
     periods = np.ones(len(points), np.int64)
@@ -167,7 +167,7 @@ def _rough_steps(dt, interval, time):
 
 
 def _wave_speed(soil, scene):
-    from mpm.pace.wave_speed import dry_wave_speed, fast_wave_speed
+    from mpm.time_step.wave_speed import dry_wave_speed, fast_wave_speed
 
     nu, water = soil.poissons_ratio, scene.water
     modulus = soil.youngs_modulus_at(scene.vertical_stress(scene.box.depth)) * (1 - nu) / ((1 + nu) * (1 - 2 * nu))

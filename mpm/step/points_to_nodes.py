@@ -334,7 +334,7 @@ def update_kernel(needs):
         Points that left their element are not mapped; `locate` does that.
 
         Stress that acts on the nodes runs ahead of that of the points by `ahead` steps of the element. Held back, a
-        spring feeds motion (`mpm.pace.levels`); ahead, it damps it: a Kelvin-Voigt viscosity of that time.
+        spring feeds motion (`mpm.time_step.levels`); ahead, it damps it: a Kelvin-Voigt viscosity of that time.
 
         first, last : range of the occupied elements;  own : the part that sums them up. Velocities of the nodes are
         those of `remap_nodes`, contents of the elements those of the last step. Written of the `system`: points,

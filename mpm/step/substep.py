@@ -11,12 +11,12 @@ import numpy as np
 
 from mpm.machine.compile import inline_kernel, kernel_part, step_kernel
 from mpm.machine.team import shared
-from mpm.pace.clock import ALMOST_ALL, END, NOW, SMALLEST, SPAN, plan_step
 from mpm.step.find import follow_points, locate_kernel, total
 from mpm.step.nodes import remap_kernel, solve_kernel
 from mpm.step.nodes_to_points import advance_kernel
 from mpm.step.points_to_nodes import update_kernel
 from mpm.step.sort import cut_by_work
+from mpm.time_step.clock import ALMOST_ALL, END, NOW, SMALLEST, SPAN, plan_step
 
 #: Passes of a substep, in their order, after one that plans the long step. A range of them may be run alone.
 PASSES = ("plan_step", "solve_nodes", "advance_points", "remap_nodes", "update_points")
@@ -34,7 +34,7 @@ class Batch(NamedTuple):
     """
 
     substeps: np.ndarray  # (most + 1,) int64; 0 ends the batch
-    limits: np.ndarray  # (most,) int64, places in `mpm.pace.clock.LIMITS`
+    limits: np.ndarray  # (most,) int64, places in `mpm.time_step.clock.LIMITS`
     most_substeps: int  # no further long step begins after so many of the finest level
     most_point_steps: int
     first_substep: int = 0  # of the first long step

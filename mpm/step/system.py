@@ -1,15 +1,15 @@
 """What the kernels of a step read and write, in named groups: arrays of :class:`mpm.Solver` and numbers of the scene.
 
 Records are those of `mpm.fields`. Rows of nodes: those of the nodes themselves, then one for each coarser level that a
-node ties to its finest (:class:`mpm.pace.levels.Levels`). Parts: of the mesh, each the work of one thread at a time
-(`mpm.machine.team`).
+node ties to its finest (:class:`mpm.time_step.levels.Levels`). Parts: of the mesh, each the work of one thread at a
+time (`mpm.machine.team`).
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from mpm.pace.clock import Clock, Pace
+from mpm.time_step.clock import Clock, Pace
 
 
 class Needs(NamedTuple):
@@ -23,7 +23,7 @@ class Needs(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """Where the levels lie in the lists of elements and nodes: see :class:`mpm.pace.levels.Levels`."""
+    """Where the levels lie in the lists of elements and nodes: see :class:`mpm.time_step.levels.Levels`."""
 
     element_cuts: np.ndarray
     node_cuts: np.ndarray

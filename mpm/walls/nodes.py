@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from mpm.fields import CONTACT_RECORD
-from mpm.initial_stress import initial_stress
+from mpm.k0_procedure import initial_stress
 from mpm.mesh.half import ring_factors, whole_ring
 from mpm.walls.gate import channel_nodes, corner_normals
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 
 from mpm.fields import SIDE_RECORD
-from mpm.initial_stress import initial_stress
+from mpm.k0_procedure import initial_stress
 from mpm.machine.compile import inline_kernel
 from mpm.walls.contact import FIXED_X, FIXED_Y, MIRROR_X, OPEN_X, OPEN_Y, Pair
 

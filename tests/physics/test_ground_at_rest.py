@@ -7,7 +7,7 @@ from scipy.special import erfc
 import coupling
 import mpm
 from mpm.fields import values
-from mpm.initial_stress import initial_stress
+from mpm.k0_procedure import initial_stress
 from verification.small_event import COARSE
 from verification.stability.amplification import Column
 

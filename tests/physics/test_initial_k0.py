@@ -15,7 +15,7 @@ from coupling.report.trust import initial_theory
 from coupling.runs.plan import rough_plan
 from coupling.scenes.features import features, initial_k0
 from mpm.fields import values
-from mpm.initial_stress import initial_stress
+from mpm.k0_procedure import initial_stress
 from mpm.points import fill
 from verification.small_event import COARSE, small_scene
 

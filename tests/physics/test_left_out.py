@@ -22,9 +22,9 @@ from mpm.fields import (
     values,
 )
 from mpm.laws.law import soil_law
-from mpm.pace.clock import Clock
 from mpm.step.nodes import solve_kernel
 from mpm.step.system import Medium, Needs, Net, System, Tally, Walls
+from mpm.time_step.clock import Clock
 from verification.small_event import small_scene
 
 pytestmark = pytest.mark.slow

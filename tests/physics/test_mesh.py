@@ -14,8 +14,8 @@ import coupling
 from mpm.mesh import CHANNEL, HEADROOM, INTERIOR, SOIL, Mesh, MeshError, altitudes, angles, areas
 from mpm.mesh.build import build_mesh
 from mpm.mesh.sizes import element_size
-from mpm.pace.levels import element_levels
 from mpm.scene import Scene
+from mpm.time_step.levels import element_levels
 
 # Coordinates up to 60 m in double precision: a few units in the last place.
 ROUND_OFF = 1e-12

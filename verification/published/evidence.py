@@ -194,7 +194,7 @@ def initial_theory(scene, tunnel):
     """
     import xarray as xr
 
-    from mpm.initial_stress import initial_stress
+    from mpm.k0_procedure import initial_stress
 
     theta = cell_centres()
     angle = np.radians(theta)

@@ -15,10 +15,10 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from mpm.fields import block, numbers
-from mpm.pace.spectrum import Spectrum, spectral_time_step
 from mpm.scene import Numerics
 from mpm.solver import Solver
 from mpm.step.substep import ADVANCE, PLAN, REMAP, SOLVE, UPDATE
+from mpm.time_step.spectrum import Spectrum, spectral_time_step
 from verification.boxes import box_mesh, box_scene, hat_functions, place, put, state
 
 DEFAULT = Numerics()

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from mpm.initial_stress import initial_stress
+from mpm.k0_procedure import initial_stress
 from mpm.mesh.build import build_mesh
 from mpm.scene import Scene
 from mpm.solver import Solver

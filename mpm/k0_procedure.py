@@ -1,4 +1,4 @@
-"""The stress of level ground before anything is built in it: its weight, water at rest, and K0 of each soil."""
+"""The K0 procedure: the stress of level ground, from its weight, water at rest and K0 of each soil."""
 
 import math
 

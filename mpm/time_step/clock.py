@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mpm.machine.compile import allocating_part, kernel
-from mpm.pace.levels import MOST_LEVELS
+from mpm.time_step.levels import MOST_LEVELS
 
 ALMOST = 1.1  # a step shortened by less to meet an output time counts as limited by what limited it before
 ALMOST_ALL = 1 - 1e-12  # of the time until the end: what is left is rounding
@@ -26,7 +26,7 @@ class Clock(NamedTuple):
     begun: np.ndarray  # (most substeps,) the coarsest level that begins a step in each substep
     finished: np.ndarray  # (most substeps,) and that ends one
     finest_around: np.ndarray  # (n_elements,) int8, finest level at the nodes of an element
-    ahead: np.ndarray  # (n_elements,) `damping`, and what `mpm.pace.levels.Levels.ahead` adds where levels meet
+    ahead: np.ndarray  # (n_elements,) `damping`, and what `mpm.time_step.levels.Levels.ahead` adds where levels meet
     damping: float  # see `mpm.scene.Numerics.stress_damping`
 
     @classmethod
@@ -35,7 +35,7 @@ class Clock(NamedTuple):
 
         Parameters
         ----------
-        levels : mpm.pace.levels.Levels
+        levels : mpm.time_step.levels.Levels
         damping : float
         """
         n, most = levels.count, 2 ** (MOST_LEVELS - 1)
@@ -57,7 +57,7 @@ class Clock(NamedTuple):
 
 
 class Pace(NamedTuple):
-    """What of scene and state decides about the time step: see `mpm.scene.Numerics` and `mpm.pace.spectrum`."""
+    """What of scene and state decides about the time step: see `mpm.scene.Numerics` and `mpm.time_step.spectrum`."""
 
     courant: float
     pic_rate: float
@@ -138,7 +138,7 @@ def plan_step(clock, pace, limits, start, occupied, n_occupied, element_cuts, le
     ----------
     limits : (n, 2) float64, of `longest_time_step`
     start, occupied, n_occupied : of the points by element
-    element_cuts, level_of_element : of :class:`mpm.pace.levels.Levels`
+    element_cuts, level_of_element : of :class:`mpm.time_step.levels.Levels`
 
     Returns
     -------
