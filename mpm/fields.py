@@ -124,6 +124,9 @@ SIDE = (
     Field("push_y", "N/m", ""),
 )
 
+#: Bits of what holds a node: grains and water, but water where the side is open.
+FIXED_X, FIXED_Y, MIRROR_X, OPEN_X, OPEN_Y = 1, 2, 4, 8, 16
+
 #: Reactions on the material at a node of a lining, times the time step, added up; and dt times their squares.
 REACTION = (
     Field("soil", "N s/m", "normal, of the grains"),

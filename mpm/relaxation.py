@@ -11,12 +11,12 @@ from functools import cache
 
 import numpy as np
 
-from mpm.fields import REACTION_RECORD, values
+from mpm.fields import FIXED_X, FIXED_Y, REACTION_RECORD, values
 from mpm.laws.law import stress_kernel
 from mpm.laws.stress import Strain, Stress
 from mpm.machine.compile import kernel
 from mpm.step.points_to_nodes import Push, force_kernel, gradients, with_point
-from mpm.walls.contact import FIXED_X, FIXED_Y, in_wall_frame, shear_limit
+from mpm.walls.contact import in_wall_frame, shear_limit
 
 MASS_SAFETY = 0.7  # pseudo Courant number of the fictitious masses
 

@@ -17,6 +17,7 @@ from pydantic import Field, SerializeAsAny, WrapValidator, model_validator
 from mpm.laws.law import built_in_laws, soil_of_its_law
 from mpm.laws.soil import Soil
 from mpm.quantities import Acceleration, Angle, Density, Length, Mass, Part, Pressure, Time, in_unit
+from mpm.walls.sides import SIDES
 
 MOST_RECORDS = 1_000_000
 #: Growth of the element size per metre above which neighbouring quadrilaterals are no longer near squares.
@@ -50,14 +51,14 @@ class Water(Part):
         with the grains, the limit of a conductivity of zero; conductivities are not read.
     sides : str
         Left, right and bottom of the box: "closed", or "held", the ground beyond keeps the pore pressure of the start
-        and water passes.
+        and water passes; a row of :data:`mpm.walls.sides.SIDES` each.
     """
 
     table_depth: Length = Field(ge=0)
     density: Density = Field(gt=500, lt=2000)
     bulk_modulus: Pressure = Field(ge=1e6, le=1e11)
     drainage: Literal["two-phase", "undrained"] = "two-phase"
-    sides: Literal["closed", "held"] = "closed"
+    sides: Literal[tuple(SIDES)] = "closed"
 
 
 #: A soil, of the class that its `model` names: one of these, or of a third party.
@@ -315,10 +316,10 @@ class Scene(Part):
                 f"'{self.lining_of(self.tunnels[moving[0]])}' of tunnel {moving[0]}, whose motion is solved with the "
                 "momentum of the water; leave drainage out and give a small hydraulic_conductivity"
             )
-        if self.is_undrained and self.water.sides == "held":
+        if self.is_undrained and SIDES[self.water.sides] is not None:
             raise ValueError(
-                "water: sides = 'held' needs water with a velocity of its own, got drainage = 'undrained'; leave one "
-                "of them out"
+                f"water: sides = '{self.water.sides}' needs water with a velocity of its own, got drainage = "
+                "'undrained'; leave one of them out"
             )
         if self.water is not None and self.water.table_depth >= self.box.depth:
             raise ValueError(

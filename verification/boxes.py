@@ -5,10 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from mpm.fields import values
+from mpm.fields import FIXED_X, FIXED_Y, values
 from mpm.mesh.build import crossed
 from mpm.scene import Numerics, Scene
-from mpm.walls.contact import FIXED_X, FIXED_Y
 
 SOIL, EMPTY = 0, 3
 STRESS = ("stress_xx", "stress_yy", "stress_zz", "stress_xy")

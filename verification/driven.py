@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from mpm.fields import block
+from mpm.fields import FIXED_X, FIXED_Y, block
 from mpm.solver import Solver
 from mpm.step.substep import ADVANCE, PLAN, REMAP, SOLVE, UPDATE
-from mpm.walls.contact import FIXED_X, FIXED_Y
 
 
 class DrivenSolver(Solver):

@@ -3,21 +3,10 @@
 from functools import cache
 from typing import NamedTuple
 
+from mpm.fields import MIRROR_X, OPEN_X, OPEN_Y
 from mpm.machine.compile import inline_kernel, kernel_part
-from mpm.walls.contact import (
-    LIQUID_HELD,
-    MIRROR_X,
-    OPEN_X,
-    OPEN_Y,
-    SOLID_HELD,
-    SOLID_STICKS,
-    Masses,
-    Pair,
-    contact_kernel,
-    free_pair,
-    in_wall_frame,
-)
-from mpm.walls.sides import constrained, past_held_grains
+from mpm.step.constraints import constrained, held_kernel, past_held_grains
+from mpm.walls.contact import Masses, Pair, contact_kernel, free_pair, in_wall_frame
 
 
 class Forces(NamedTuple):
@@ -309,31 +298,6 @@ def solve_kernel(needs):
             solve_node(system.net.which_node[k], begun, system.tally.ledger[own], system)
 
     return solve_nodes
-
-
-@cache
-def held_kernel(two_phase):
-    """Kernel `held_at_wall` for one velocity or two."""
-
-    @kernel_part
-    def held_at_wall(v, status, contact):
-        """Velocities seen from a wall, under the constraints that acted in this step."""
-        sx, sy, lx, ly = v
-        if status & SOLID_STICKS:
-            sx = sy = 0.0
-        else:
-            vn = contact.normal_x * sx + contact.normal_y * sy
-            if status & SOLID_HELD or vn < 0.0:
-                sx -= vn * contact.normal_x
-                sy -= vn * contact.normal_y
-        if two_phase:
-            vn = contact.normal_x * lx + contact.normal_y * ly
-            if status & LIQUID_HELD or vn < 0.0:
-                lx -= vn * contact.normal_x
-                ly -= vn * contact.normal_y
-        return Pair(sx, sy, lx, ly)
-
-    return held_at_wall
 
 
 @cache

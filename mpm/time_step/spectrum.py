@@ -23,14 +23,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm.fields import record
+from mpm.fields import FIXED_X, FIXED_Y, OPEN_X, OPEN_Y, record
 from mpm.laws.law import moduli_kernel
 from mpm.machine.compile import index, inline_kernel, kernel_part, step_kernel
 from mpm.machine.team import shared
 from mpm.step.cells import felt_share
 from mpm.step.nodes_to_points import shares
 from mpm.step.points_to_nodes import gradients
-from mpm.walls.contact import FIXED_X, FIXED_Y, OPEN_X, OPEN_Y, Masses, free_pair
+from mpm.walls.contact import Masses, free_pair
 
 SAFETY = 0.9  # Ritz values come from below, and points move until the next estimate
 TOLERANCE = 1e-2  # of the largest eigenvalue

@@ -14,8 +14,7 @@ from typing import NamedTuple
 
 from mpm.machine.compile import inline_kernel, kernel_part
 
-#: Bits of what holds a node: grains and water, but water where the side is open.
-FIXED_X, FIXED_Y, MIRROR_X, OPEN_X, OPEN_Y = 1, 2, 4, 8, 16
+#: Bits of the constraints that acted at a wall.
 SOLID_HELD, SOLID_STICKS, LIQUID_HELD = 1, 2, 4
 
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from mpm.walls.contact import FIXED_X, FIXED_Y
+from mpm.fields import FIXED_X, FIXED_Y
 
 
 def along_gate(scene):

@@ -1,13 +1,25 @@
-"""Sides of the box: grains are held there; water too, or the ground beyond keeps its pressure and water passes."""
+"""Sides of the box, each condition a row of one table: grains are held there; water too, or it passes against the
+pressure that the ground beyond keeps.
+
+Kernels know no condition by its name: they read what holds a node, and what pushes its water (`mpm.fields.SIDE`).
+"""
 
 from itertools import pairwise
 
 import numpy as np
 
-from mpm.fields import SIDE_RECORD
+from mpm.fields import FIXED_X, FIXED_Y, MIRROR_X, OPEN_X, OPEN_Y, SIDE_RECORD
 from mpm.k0_procedure import initial_stress
-from mpm.machine.compile import inline_kernel
-from mpm.walls.contact import FIXED_X, FIXED_Y, MIRROR_X, OPEN_X, OPEN_Y, Pair
+
+
+def pressure_at_start(scene, depth):
+    """Pore pressure of the undisturbed ground [Pa] at depths [m], (n,) float64."""
+    return initial_stress(scene, depth)[1]
+
+
+#: What `mpm.scene.Water.sides` may be: the pore pressure that the ground beyond left, right and bottom keeps, of scene
+#: and depths, as of :func:`pressure_at_start`; None where no water passes.
+SIDES = {"closed": None, "held": pressure_at_start}
 
 
 def sides_of(scene, mesh, mirror_line):
@@ -23,7 +35,7 @@ def sides_of(scene, mesh, mirror_line):
     Returns
     -------
     fixed : (n_nodes,) int8
-        Bits of `mpm.walls.contact`.
+        Bits of `mpm.fields`.
     sides : (n_nodes,) records of `mpm.fields.SIDE`
     """
     fixed, sides = np.zeros(len(mesh.nodes), np.int8), np.zeros(len(mesh.nodes), SIDE_RECORD)
@@ -31,7 +43,7 @@ def sides_of(scene, mesh, mirror_line):
     fixed[mesh.right] |= FIXED_X
     fixed[mesh.bottom] |= FIXED_X | FIXED_Y
     fixed[mirror_line] |= MIRROR_X
-    if scene.water is not None and scene.water.sides == "held":
+    if scene.water is not None and SIDES[scene.water.sides] is not None:
         if not len(mirror_line):
             _open(scene, mesh, mesh.left, "x", 1.0, sides)
         _open(scene, mesh, mesh.right, "x", -1.0, sides)
@@ -42,7 +54,7 @@ def sides_of(scene, mesh, mirror_line):
 
 
 def _open(scene, mesh, nodes, axis, inward, sides):
-    """Let water pass the edges between some nodes, below the surface, against the pressure of the start.
+    """Let water pass the edges between some nodes, below the surface, against the pressure beyond.
 
     The push is exact where pressure is linear along an edge: inside, that of linear triangles is.
     """
@@ -53,30 +65,7 @@ def _open(scene, mesh, nodes, axis, inward, sides):
         if edge[:, 1].max() > 0.0:
             continue
         length = float(np.hypot(*(edge[1] - edge[0])))
-        _, pressure = initial_stress(scene, -edge[:, 1])
+        pressure = SIDES[scene.water.sides](scene, -edge[:, 1])
         for node, own, other in ((a, pressure[0], pressure[1]), (b, pressure[1], pressure[0])):
             sides[f"area_{axis}"][node] += inward * length / 2
             sides[f"push_{axis}"][node] += inward * length * (2 * own + other) / 6
-
-
-@inline_kernel
-def past_held_grains(v, b, m, fixed):
-    """Velocities of a node where water passes grains that are held; b : momenta without reactions, m : Masses."""
-    lx = b.liquid_x / (m.liquid + m.drag) if fixed & OPEN_X else v.liquid_x
-    ly = b.liquid_y / (m.liquid + m.drag) if fixed & OPEN_Y else v.liquid_y
-    return Pair(v.solid_x, v.solid_y, lx, ly)
-
-
-@inline_kernel
-def constrained(v, fixed):
-    """Velocities under the constraints of box and mirror line."""
-    sx, sy, lx, ly = v
-    if fixed & FIXED_X:
-        sx = 0.0
-        if not fixed & OPEN_X:
-            lx = 0.0
-    if fixed & FIXED_Y:
-        sy = 0.0
-        if not fixed & OPEN_Y:
-            ly = 0.0
-    return Pair(sx, sy, lx, ly)

@@ -9,9 +9,8 @@ import pytest
 import coupling
 import mpm
 import mpm.scene
-from mpm.fields import CONTACT_RECORD, block, numbers, values
+from mpm.fields import CONTACT_RECORD, FIXED_X, FIXED_Y, block, numbers, values
 from mpm.state import restore_solver, solver_state
-from mpm.walls.contact import FIXED_X, FIXED_Y
 from mpm.walls.moving_lining import STATE_RECORD, reaction_kernel
 from mpm.walls.rings import ElasticRing, RigidRing
 from verification.problems import exact_rings

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import mpm
+from mpm.walls.sides import SIDES, pressure_at_start
 from verification.boxes import box_mesh, box_scene, run_to, state
 from verification.problems.columns import seepage
 
@@ -40,3 +41,19 @@ def test_ground_at_rest_stays_at_rest_between_held_sides():
 def test_undrained_ground_has_no_open_sides():
     with pytest.raises(ValueError, match="sides = 'held' needs water with a velocity of its own"):
         box_scene("tight", 0.25, 2.0, 1.0, bulk_modulus=8e7, drainage="undrained", sides="held")
+
+
+def test_a_head_of_its_own_is_one_row_of_the_table_of_sides(monkeypatch):
+    # heads beyond all sides that grow by a fifth of the depth: water rises evenly, by Darcy's law with k i
+    monkeypatch.setitem(SIDES, "held", lambda scene, depth: 1.2 * pressure_at_start(scene, depth))
+    size, conductivity, porosity = 0.125, 1e-3, 0.45
+    scene = box_scene(
+        "artesian", size, 0.5, 1.0, model="elastic", youngs_modulus=4e7, porosity=porosity,
+        hydraulic_conductivity=conductivity, bulk_modulus=8e7, sides="held",
+    )  # fmt: skip
+    solver = mpm.Solver(scene, box_mesh(np.linspace(-0.25, 0.25, 5), np.linspace(-1, size, 10)), threads=1)
+    run_to(solver, 1.0)
+    depth, pressure = -state(solver, "y"), state(solver, "pore_pressure")
+    assert np.abs(pressure - 1.2 * 9810 * depth).max() < 0.01 * 1.2 * 9810  # waves that are left
+    rising = porosity * state(solver, "velocity_liquid_y").mean()
+    assert rising == pytest.approx(0.2 * conductivity, rel=0.01)

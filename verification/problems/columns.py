@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
+from mpm.fields import OPEN_X, OPEN_Y
 from mpm.solver import Solver
-from mpm.walls.contact import OPEN_X, OPEN_Y
 from verification.boxes import STRESS, box_mesh, box_scene, hold, inside, put, run_to, state
 from verification.driven import DrivenSolver
 from verification.loads import theory_pressures

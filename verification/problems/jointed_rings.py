@@ -6,10 +6,9 @@ import numpy as np
 
 import coupling
 import mpm
-from mpm.fields import block
+from mpm.fields import FIXED_X, FIXED_Y, block
 from mpm.mesh import SOIL, Mesh
 from mpm.mesh.build import crossed
-from mpm.walls.contact import FIXED_X, FIXED_Y
 from verification.problems.exact_jointed_rings import ElasticGround, HingedRing, ring_in_ground
 from verification.problems.problem import Problem, Result, register
 
