@@ -10,7 +10,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from mpm.machine.compile_options import compare_quickly
+from mpm.machine.compile_options import compile_quickly
 from mpm.machine.kernel_cache import KernelCache, kernel_folder, variant_name
 
 # contract: fused multiply-add; nsz, arcp: harmless reordering. No "nnan" or "ninf": the
@@ -20,7 +20,7 @@ FAST_MATH = {"contract", "nsz", "arcp"}
 # pass out by default; NUMBA_SLP_VECTORIZE in the environment decides where it is set.
 if "NUMBA_SLP_VECTORIZE" not in os.environ:
     numba.config.SLP_VECTORIZE = 1
-compare_quickly()
+compile_quickly()
 # forceinline: kernels that call others are one piece of machine code with them. Were the others code of their own, the
 # process that compiles would call that, and those that load what it compiled the copies that come with the caller,
 # which were optimised once more: other bits.
@@ -30,7 +30,7 @@ FOLDER = kernel_folder({**OPTIONS, "fastmath": sorted(FAST_MATH), "slp_vectorize
 
 def kernel(function, **options):
     """Compile a function of arrays and numbers when it is first called, once for all processes."""
-    compiled = _compiled(function, **options)
+    compiled = _compiled(function, no_cfunc_wrapper=True, **options)
     if FOLDER is not None:
         compiled._cache = KernelCache(function, FOLDER)
     return compiled

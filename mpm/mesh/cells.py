@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mpm.machine.compile import kernel
+from mpm.machine.compile import kernel, kernel_part
 from mpm.mesh.mesh import MeshError
 from mpm.mesh.sizes import size_callback
 
@@ -264,7 +264,7 @@ def shape_energy(position, cells, softness, size, weight, power, slope):
     return energy
 
 
-@kernel
+@kernel_part
 def lowest_altitude(position, corner):
     """Smallest altitude of the four triangles of a quadrilateral; negative where its diagonals do not cross."""
     x0, y0 = position[2 * corner[0]], position[2 * corner[0] + 1]

@@ -1,11 +1,14 @@
 """Compiled kernels are kept for other processes, are never another variant's, and are not needed."""
 
+import gc
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import pytest
+from numba.core import event
 
 pytestmark = pytest.mark.slow
 
@@ -141,3 +144,35 @@ def test_options_of_kernels_are_compared_and_hashed_as_numba_does():
             assert compile_options.equal(one, two) == (one.values() == two.values())
         assert compile_options.hash_of(one) == compile_options._hash(one)
     assert plain == named != other and Flags.__eq__ is compile_options.equal
+
+
+def test_the_garbage_collector_rests_while_numba_compiles_and_no_longer():
+    import mpm.machine.compile  # noqa: F401, sees to it
+
+    at_start = []
+
+    class Look(event.Listener):
+        """Notes whether the collector runs when a kernel begins."""
+
+        def on_start(self, event):
+            at_start.append(gc.isenabled())
+
+        def on_end(self, event):
+            pass
+
+    def good(number):
+        return number + 1
+
+    def bad(number):
+        return number + "text"
+
+    look = Look()
+    event.register("numba:compile", look)
+    try:
+        assert numba.njit(good)(1) == 2 and gc.isenabled()
+        with pytest.raises(numba.TypingError):
+            numba.njit(bad)(1)
+        assert gc.isenabled()
+    finally:
+        event.unregister("numba:compile", look)
+    assert at_start == [False, False]
