@@ -11,6 +11,9 @@ FLOWS, DISTURBED = 0.05, 0.01
 #: What sums of a cell may be off by, over its area, and rotated stresses, over stress and shear modulus [-].
 ROUNDING = 1e-9
 
+#: Where the motion of a lining is given, and its forces.
+WHOLE_DEGREES = np.arange(360.0)
+
 #: Acceleration of a grain at the gate over gravity: what presses 20 m below ground, over a gate's width of 0.2 m.
 STEEPEST = 100.0
 
@@ -250,5 +253,5 @@ class Measures:
                 }
             )
             if self.moving is not None:
-                result[-1] |= self.moving.motion_at(len(result) - 1, part.theta)
+                result[-1] |= self.moving.motion_at(len(result) - 1, WHOLE_DEGREES)
         return result

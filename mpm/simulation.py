@@ -34,7 +34,7 @@ class Record:
     `dt` and `steps` are those of the smallest elements. Pressures [Pa], compression positive; `lining` has one dict a
     tunnel with theta [degrees from the crown, clockwise], arc [m], soil_pressure (effective), water_pressure,
     soil_shear (clockwise traction on the lining) and the standard deviation of the first two within the interval;
-    of a lining that moves also its displacement at the end, and of an elastic one its forces
+    of a lining that moves also its displacement at the end, and of one that deforms its forces, at whole degrees
     (`mpm.walls.moving_lining.MovingLinings.motion_at`).
     `balances` are those of :meth:`mpm.Solver.balances`, `errors` those of :func:`mpm.errors.errors`.
     """

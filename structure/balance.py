@@ -48,7 +48,7 @@ def even_loads(theta: np.ndarray, by_pressure, by_shear, rigid: np.ndarray) -> t
 def without_unborne(
     ring: Ring, loads: np.ndarray, resultant: np.ndarray, magnitude: np.ndarray, unit: np.ndarray, times: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Loads whose sums are all borne: what is next to nothing, or inertia, is taken out evenly, more is refused.
+    """Loads whose sums are all borne: what is next to nothing is taken out evenly, more is refused.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def without_unborne(
     """
     rest = np.where(borne(ring)[:, None], 0.0, resultant)
     unborne = np.abs(rest).max(0) / np.maximum(magnitude, 1e-300)
-    if ring.support != "inertia" and np.any(unborne > BALANCE_TOLERANCE):
+    if np.any(unborne > BALANCE_TOLERANCE):
         first = int(np.argmax(unborne > BALANCE_TOLERANCE))
         raise ValueError(_refusal(ring, rest[:, first], unborne[first], times[first]))
     return loads - rest.T @ unit, unborne

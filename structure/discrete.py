@@ -18,13 +18,11 @@ from structure.balance import borne, even_loads, without_unborne
 from structure.lining import THETA, LiningFailure, LiningModel, origin, response_dataset
 from structure.newton import NoEquilibrium, RingEquilibrium
 from structure.pressures import check_pressures
-from structure.response import FORCES, RESPONSE
+from structure.response import BOLT_FORCE, FORCES, RESPONSE
 from structure.ring import Ring
 from structure.ring_forces import RingForces, RingParts
 from structure.staggered import coupling_springs, paired
 
-#: Units and long name of the one variable that only rings with bolts have.
-BOLT_FORCE = {"units": "N/m", "long_name": "force in the bolts of a joint per metre of tunnel, tension positive"}
 #: Both sides of an angle [rad]: at a joint the mean of the two is given.
 SIDES = (-1e-9, 1e-9)
 #: Matrices are so small that threads only wait for each other: on a busy machine two cost 200 times one's time.
@@ -134,7 +132,9 @@ class DiscreteLining(LiningModel):
         states = self._own(both)
         fields = {"balanced_uplift": states.balanced, "unborne_resultant": states.unborne}
         fields |= {name: self._where_lined(force) for name, force in self._section_forces(states.displacements)}
-        fields |= self.joint_fields(states)
+        fields |= self.joint_fields(states.displacements, states.slips)
+        if "joint_bolt_force" in fields:
+            fields["joint_bolt_force"] = ("time", "joint"), fields["joint_bolt_force"], BOLT_FORCE
         fields |= self._balances(both)
         fields["shear_moment_residual"] = self._shear_moment_residual(fields, states, checked)
         fields |= self._movements(states.displacements)
@@ -263,11 +263,14 @@ class DiscreteLining(LiningModel):
         values[:, self.readings.lined == 0] = np.nan
         return values
 
-    def joint_fields(self, states: States) -> dict[str, np.ndarray]:
-        """Movements of and forces in the joints, (n_times, n_joints) each."""
+    def joint_fields(self, displacements: np.ndarray, slips: np.ndarray) -> dict[str, np.ndarray]:
+        """Movements of and forces in the joints, (n_times, n_joints) each; of the bolts where there are any.
+
+        displacements, slips : as of :class:`States`.
+        """
         equilibrium, parts = self._forces, self.parts
-        opening, dislocation, rotation = np.moveaxis(equilibrium.jumps(states.displacements), -1, 0)
-        forces = equilibrium.joint_forces(states.displacements, states.slips)
+        opening, dislocation, rotation = np.moveaxis(equilibrium.jumps(displacements), -1, 0)
+        forces = equilibrium.joint_forces(displacements, slips)
         if parts.faces is None:
             axial, shear, moment = forces.axial, forces.shear, forces.moment
         else:
@@ -278,8 +281,8 @@ class DiscreteLining(LiningModel):
             )
         fields = {}
         if parts.bolts is not None:
-            pull, _ = equilibrium.bolt_forces(states.displacements)
-            fields["joint_bolt_force"] = ("time", "joint"), pull, BOLT_FORCE
+            pull, _ = equilibrium.bolt_forces(displacements)
+            fields["joint_bolt_force"] = pull
             axial = axial - pull
             moment = moment + np.array([bolts.offset for bolts in self.ring.bolts]) * pull
         return fields | {

@@ -74,7 +74,7 @@ class ReducedRing:
         ring, parts = lining.ring, lining.parts
         self.outer_radius, self.radius = ring.outer_radius, ring.centre_radius
         check_movable(ring)
-        self.law, self.bolt_law = parts.law, parts.bolt_law
+        self._lining, self.law, self.bolt_law = lining, parts.law, parts.bolt_law
         linear = self.law.linear and self.bolt_law is None
         mass, rigid = density * parts.mass, parts.rigid.T
         deformed = _orthonormal(_answers(lining, mass, rigid, n_harmonics), mass)
@@ -198,6 +198,15 @@ class ReducedRing:
             if self.bolt_law is not None:
                 moved[ways:] = self.bolt_law.between(tried[ways:], stiffness[ways:])
         raise NoEquilibrium(f"joints are {np.abs(apart).max():.3g} m apart after {MAX_ITERATIONS} iterations")
+
+    def joints(self, displacement: np.ndarray, slip: np.ndarray) -> dict[str, np.ndarray]:
+        """Movements of and forces in the joints and their bolts, (n_joints,) float64 each, named as in a response.
+
+        slip : (n_joints,) float64, irreversible dislocations [m]; empty where joints are linear.
+        """
+        slips = slip if slip.size else np.zeros(self.law.count)
+        fields = self._lining.joint_fields((self.basis @ displacement)[None], slips[None])
+        return {name: values[0] for name, values in fields.items()}
 
     def internal_forces(self, displacement: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """N, Q [N/m] and M [N m/m] at theta [rad], (n,) float64 each; signs: `structure.response`."""

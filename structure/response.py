@@ -48,6 +48,9 @@ RESPONSE = {
     ),
 }
 
+#: Units and long name of the one variable that only rings with bolts have.
+BOLT_FORCE = {"units": "N/m", "long_name": "force in the bolts of a joint per metre of tunnel, tension positive"}
+
 #: Variables of a response that are no state of the ring: their change since the first record says nothing.
 NOT_ADDITIONAL = ("equilibrium_residual", "shear_moment_residual", "unborne_resultant", "inflow_mass")
 

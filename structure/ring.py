@@ -178,9 +178,9 @@ class Ring(Input):
         A lining held fixed while its pressures are taken carries their vertical resultant (buoyancy less weight).
         True: that resultant is balanced at every time by a radial soil pressure a cos(theta) on the outer face, as
         much more at the crown as less at the invert. False: soil springs (or the support) carry it.
-    support : {"free", "invert", "inertia"}
+    support : {"free", "invert"}
         "invert": the ring is clamped at the node next to its invert, as in a test stand. "free": only the ground
-        holds it. "inertia": what loads leave over is spread evenly around the ring, as by one that moves.
+        holds it.
     n_elements : int
         Straight beam elements around the ring.
     section : {"timoshenko", "euler-bernoulli"}
@@ -207,7 +207,7 @@ class Ring(Input):
     neighbour: Neighbour | None = None
     ground: Ground | None = None
     balance_uplift: bool = False
-    support: Literal["free", "invert", "inertia"] = "free"
+    support: Literal["free", "invert"] = "free"
     n_elements: int = Field(default=360, ge=24, le=20000)
     section: Literal["timoshenko", "euler-bernoulli"] = "timoshenko"
 

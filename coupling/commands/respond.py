@@ -65,7 +65,7 @@ def respond_command(
         targets = [responses.chosen_file(source, name, out, overwrite) for source in sources]
         answers = []
         for source, target in zip(sources, targets, strict=True):
-            response = responses.respond_by_name(source.ring, source.pressures, backend)
+            response = responses.respond_by_name(source.ring, source.pressures, backend, source.moved)
             response = responses.with_checks(response, source.limits(given))
             found = summarise_response(response)
             found["file"] = str(responses.store_response(response, source, name, target))

@@ -69,7 +69,8 @@ def run_command(
             data = {"run": str(folder), **summarise_run(file), "response": None}
             with contextlib.suppress(RunFileError):
                 data["response"] = summarise_response(read_response(file))
-                data["quality"]["lining_equilibrium"] = data["response"]["equilibrium_residual"]
+                if data["response"]["equilibrium_residual"] is not None:
+                    data["quality"]["lining_equilibrium"] = data["response"]["equilibrium_residual"]
                 data["verdicts"] = verdicts(data["quality"])
                 for tunnel, one in data["tunnels"].items():
                     one["response"] = summarise_response(read_response(file, tunnel=tunnel))

@@ -3,7 +3,7 @@
 import re
 
 from mpm.fields import CLAMPS, POINT
-from structure.response import COORDINATES, RESPONSE
+from structure.response import BOLT_FORCE, COORDINATES, RESPONSE
 
 AXES = {"time": "T", "x": "X", "y": "Y"}
 INFLOW = "inflow_mass"  # a coordinate along time, beside the time itself
@@ -16,7 +16,7 @@ PRESSURES = {
     "soil_pressure_std": ("Pa", "standard deviation of the soil pressure within the output interval"),
     "water_pressure_std": ("Pa", "standard deviation of the water pressure within the output interval"),
 }
-#: The same for linings that move in the soil computation: at the end of the interval, since the undisturbed ground.
+#: For linings that move in the soil computation: at the end of the interval and at theta, since the undisturbed ground.
 MOTION = {
     "displacement_radial": ("m", "displacement of the lining's outer face, outward positive"),
     "displacement_tangential": ("m", "displacement of the lining's outer face, clockwise positive"),
@@ -28,7 +28,9 @@ RING_FORCES = {
     "bending_moment": ("N m/m", "bending moment of the lining that deforms, tension on the outer face positive"),
 }
 #: Of jointed ones, on (time, [tunnel,] joint).
-JOINT_MOVEMENTS = {name: RESPONSE[name][1:] for name in ("joint_opening", "joint_dislocation", "joint_rotation")}
+JOINT_STATES = {name: meaning for name, (axes, *meaning) in RESPONSE.items() if axes == ("time", "joint")}
+#: And of their bolts, where there are any.
+BOLT_STATES = {"joint_bolt_force": tuple(BOLT_FORCE.values())}
 JOINTS = {name: COORDINATES[name] for name in ("joint", "joint_angle")}
 #: Variables on (time,) that `/lining` repeats from `/history`, so that pressures can be compared at equal inflow.
 PROGRESS = {

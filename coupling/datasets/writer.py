@@ -14,12 +14,13 @@ from coupling.datasets.geometry import geometry_attributes
 from coupling.datasets.open_run import OpenRun
 from coupling.datasets.schema import (
     BALANCES,
+    BOLT_STATES,
     DT_LIMITS,
     ERRORS,
     HISTORY,
     INFLOW,
     INTEGERS,
-    JOINT_MOVEMENTS,
+    JOINT_STATES,
     JOINTS,
     MOTION,
     POINTS,
@@ -80,6 +81,8 @@ class RunWriter:
         deforms = kinds & {"elastic", "jointed"}
         self._on_theta = PRESSURES | (MOTION if kinds - {"fixed"} else {}) | (RING_FORCES if deforms else {})
         self._joints = scene.ring.joint_angles if "jointed" in kinds else ()
+        bolted = self._joints and scene.ring.bolts
+        self._at_joints = (JOINT_STATES if self._joints else {}) | (BOLT_STATES if bolted else {})
 
     @property
     def written(self):
@@ -170,13 +173,14 @@ class RunWriter:
         for name, meaning in self._on_theta.items():
             chunk = (16, *tunnels.values(), 360)
             variable = _variable(lining, name, ("time", *tunnels, "theta"), "f8", meaning, chunk)
-            variable.attrs["cell_methods"] = f"time: {'mean' if name in PRESSURES else 'point'} theta: mean"
+            kind = "mean" if name in PRESSURES else "point"
+            variable.attrs["cell_methods"] = f"time: {kind} theta: {kind}"
         if self._joints:
             lining.dimensions["joint"] = len(self._joints)
             _variable(lining, "joint", ("joint",), "i4", JOINTS["joint"])[:] = 1 + np.arange(len(self._joints))
             _variable(lining, "joint_angle", ("joint",), "f8", JOINTS["joint_angle"])[:] = self._joints
             lining.attrs["coordinates"] += " joint_angle"
-        for name, meaning in JOINT_MOVEMENTS.items() if self._joints else ():
+        for name, meaning in self._at_joints.items():
             chunk = (64, *tunnels.values(), len(self._joints))
             variable = _variable(lining, name, ("time", *tunnels, "joint"), "f8", meaning, chunk)
             variable.attrs["cell_methods"] = "time: point"
@@ -196,7 +200,7 @@ class RunWriter:
         for name in self._on_theta if self._n_tunnels else ():
             values = np.array([[self._resample(t, part, name) for t, part in enumerate(r.lining)] for r in batch])
             stored[name][rows] = values if self._n_tunnels > 1 else values[:, 0]
-        for name in JOINT_MOVEMENTS if self._joints else ():
+        for name in self._at_joints:
             none = np.full(len(self._joints), np.nan)  # of a lining that is not jointed, beside one that is
             values = np.array([[part.get(name, none) for part in record.lining] for record in batch])
             stored[name][rows] = values if self._n_tunnels > 1 else values[:, 0]
@@ -205,10 +209,10 @@ class RunWriter:
         stored["time"][rows] = [record.time for record in batch]
 
     def _resample(self, tunnel, part, name):
+        if name not in PRESSURES:  # none of a lining that does not deform, beside one that does
+            return part.get(name, np.full(360, np.nan))
         if tunnel not in self._weights:
             self._weights[tunnel] = cell_mean_weights(part["theta"])
-        if name not in part:  # of a lining that does not deform, beside one that does
-            return np.full(360, np.nan)
         return self._weights[tunnel] @ part[name]
 
     def _write_history(self, group, stored, batch):

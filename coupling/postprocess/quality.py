@@ -106,13 +106,16 @@ def quality(history: xr.Dataset, response: xr.Dataset | None = None) -> dict[str
         **{name: float(history[name].values.max()) for name in STATES if name in last},
         "clamps": clamps,
     }
-    if response is not None and "equilibrium_residual" in response:
-        result["lining_equilibrium"] = lining_equilibrium(response)
+    unbalanced = None if response is None else lining_equilibrium(response)
+    if unbalanced is not None:
+        result["lining_equilibrium"] = unbalanced
     return result
 
 
-def lining_equilibrium(response: xr.Dataset) -> float:
-    """Largest unbalanced force of a lining model's answer over its loads [-]."""
+def lining_equilibrium(response: xr.Dataset) -> float | None:
+    """Largest unbalanced force of a lining model's answer over its loads [-]; None of one that moved in the ground."""
+    if "equilibrium_residual" not in response:
+        return None
     return float(np.abs(response["equilibrium_residual"].values).max())
 
 
@@ -154,4 +157,4 @@ def stored_quality(attributes: Mapping[str, Any]) -> dict[str, float]:
 
 def quality_attributes(values: dict[str, Any]) -> dict[str, float]:
     """The same as attributes of a run file: `quality_<name>`, numbers only."""
-    return {f"quality_{name}": value for name, value in values.items() if name != "clamps"}
+    return {f"quality_{name}": value for name, value in values.items() if name != "clamps" and value is not None}

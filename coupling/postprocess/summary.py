@@ -88,8 +88,8 @@ def summarise_response(response: xr.Dataset) -> dict[str, Any]:
     dict
         axial_force, shear_force [N/m], bending_moment [N m/m]: for "initial" and "final" max, max_theta, min, min_theta
         [degree]; joint_opening, joint_dislocation [m], joint_rotation [rad]: for "initial" and "final" the value of
-        every joint; equilibrium_residual [-]: the largest; utilisations: as of :func:`structure.utilisations`, empty
-        without limits.
+        every joint; equilibrium_residual [-]: the largest, None of a lining that moved in the ground; utilisations: as
+        of :func:`structure.utilisations`, empty without limits.
     """
     data = {}
     states = {"initial": response.isel(time=0), "final": response.isel(time=-1)}

@@ -66,6 +66,11 @@ def compare(source, first="beam-spring", second="continuum", open_gate=None):
     places, (first, second) = (first, second), (model.rpartition(":")[2] for model in (first, second))
     if first == second:
         raise Refused(f"compare: models must differ, got {first!r} twice; choose another --first or --second")
+    if source.moved is not None:
+        raise Refused(
+            f"compare: the lining has moved in the ground as {source.moved!r}, and under another model the ground"
+            " would press otherwise; run the scene with each lining_model and compare the runs: gush compare RUN OTHER"
+        )
     responses, seconds = {}, {}
     for place, name in zip(places, (first, second), strict=True):
         options = _gate_options(source, open_gate) if open_gate is not None and name == "continuum" else {}

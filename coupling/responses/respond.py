@@ -10,8 +10,9 @@ from coupling.datasets import write_dataset, write_response
 from coupling.datasets.geometry import on_tunnel, tunnels_beside
 from coupling.files.provenance import origin, with_history
 from coupling.refused import Refused, SceneError
+from coupling.responses.moved import as_it_moved
 from coupling.responses.source import Source
-from coupling.scenes.rings import answering_ring, gate_tunnel, limits_at
+from coupling.scenes.rings import gate_tunnel, limits_at, moved_by, ring_of
 from coupling.scenes.scene import Scene
 from structure import Limits, check, lining_model
 from structure.lining import at_whole_degrees
@@ -19,36 +20,57 @@ from structure.models import model_name
 from structure.ring import Ring
 
 
-def respond(scene: Scene, pressures: xr.Dataset, backend: str = "beam-spring", tunnel: int | None = None) -> xr.Dataset:
+def respond(scene: Scene, pressures: xr.Dataset, backend: str | None = None, tunnel: int | None = None) -> xr.Dataset:
     """Response of the scene's ring to the pressures on a tunnel, by the lining model of that name, with its checks.
 
-    tunnel : int or None, None: the one with the gate.
+    A ring that has moved in the ground has answered there: its forces are the response (:func:`check_backend`).
+
+    backend : None: the model that has moved the ring, else "beam-spring";  tunnel : None: the one with the gate.
 
     Raises Refused: no ring, no such model, or pressures or ring that the model does not take; structure.LiningFailure:
     no equilibrium.
     """
     number = gate_tunnel(scene) if tunnel is None else tunnel
-    pressures = on_tunnel(pressures, number)
+    pressures, moved = on_tunnel(pressures, number), moved_by(scene, number)
     try:
-        ring = answering_ring(scene, number)
+        ring = ring_of(scene, number)
     except SceneError as problem:
         raise Refused(str(problem)) from None
-    return with_checks(respond_by_name(ring, pressures, backend), limits_at(scene, number, scene.limits))
+    response = respond_by_name(ring, pressures, backend or moved or "beam-spring", moved)
+    return with_checks(response, limits_at(scene, number, scene.limits))
 
 
 def responses_on(
-    scene: Scene, pressures: xr.Dataset, backend: str = "beam-spring"
+    scene: Scene, pressures: xr.Dataset, backend: str | None = None
 ) -> Iterator[tuple[tuple[str, int | None], xr.Dataset]]:
     """Responses of all tunnels, each of its own ring: (model, tunnel as of :func:`respond`) and response."""
     for tunnel in (None, *tunnels_beside(pressures)):
-        yield (model_name(backend), tunnel), respond(scene, pressures, backend, tunnel)
+        response = respond(scene, pressures, backend, tunnel)
+        yield (response.attrs["model"], tunnel), response
 
 
-def respond_by_name(ring: Ring, pressures: xr.Dataset, backend: str, **options: Any) -> xr.Dataset:
+def check_backend(backend: str, moved: str | None) -> None:
+    """Refuse a lining model by name for a ring that another one (:func:`coupling.scenes.rings.moved_by`) has moved."""
+    if moved is not None and model_name(backend) != moved:
+        raise Refused(
+            f"lining model {model_name(backend)!r}: must be {moved!r}, which has moved this ring in the ground; under"
+            f" another the ground would press otherwise: choose {moved!r}, or run the scene with that lining_model of"
+            " the tunnel"
+        )
+
+
+def respond_by_name(
+    ring: Ring, pressures: xr.Dataset, backend: str, moved: str | None = None, **options: Any
+) -> xr.Dataset:
     """Response of a ring by the lining model of that name; `options` go to the model.
+
+    moved : the model that has moved the ring in the ground, as of :func:`coupling.scenes.rings.moved_by`.
 
     Raises Refused, structure.LiningFailure: as :func:`respond`.
     """
+    check_backend(backend, moved)
+    if moved is not None:
+        return as_it_moved(ring, pressures, moved)
     try:
         return at_whole_degrees(lining_model(backend)(ring, **options).respond(pressures))
     except ValueError as problem:

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from coupling.datasets import RunFileError, opened, run_file
 from coupling.datasets.geometry import on_tunnel, tunnels_beside
 from coupling.refused import SceneError
-from coupling.scenes.rings import answering_ring, gate_tunnel, limits_at
+from coupling.scenes.rings import gate_tunnel, limits_at, moved_by, ring_of
 from coupling.scenes.scene import Scene, load_scene, parse_scene
 from structure.inputs import mistakes, refusal
 from structure.limits import Limits
@@ -21,7 +21,8 @@ class Source(NamedTuple):
     """Pressures (time, theta) [Pa] of one tunnel and the ring they act on.
 
     is_own : whether they are the group /lining of a run and the ring is that run's own, so that the response belongs
-    into the run;  tunnel : None: the only one, or that with the gate;  scene : that with the ring, None without.
+    into the run;  tunnel : None: the only one, or that with the gate;  scene : that with the ring, None without;
+    moved : lining model of a ring that has moved in the ground, whose forces are in `pressures`.
     """
 
     file: Path
@@ -30,6 +31,7 @@ class Source(NamedTuple):
     ring: Ring
     tunnel: int | None = None
     scene: Scene | None = None
+    moved: str | None = None
 
     def limits(self, given: Limits | None = None) -> Limits | None:
         """Limits that are given, else those of the scene; what they leave out is that of the scene at the tunnel."""
@@ -87,14 +89,15 @@ def _source(file, is_run, pressures, root, own, chosen, tunnel):
     except ValueError as problem:
         raise RunFileError(f"'{file}': {problem}") from problem
     is_own = is_run and own is not None and own.ring is not None and _ring(file, root, own, tunnel) == ring
-    return Source(file, is_own, checked, ring, tunnel, chosen)
+    moved = moved_by(own, gate_tunnel(own) if tunnel is None else tunnel) if is_own else None
+    return Source(file, is_own, checked if moved is None else pressures, ring, tunnel, chosen, moved)
 
 
 def _ring(file, root, scene, tunnel):
     if scene is not None:
         if scene.ring is None:
             raise RunFileError(f"'{file}': scene '{scene.name}' has no [ring]; choose another --scene")
-        return answering_ring(scene, gate_tunnel(scene) if tunnel is None else tunnel)
+        return ring_of(scene, gate_tunnel(scene) if tunnel is None else tunnel)
     if "ring" not in root.attrs:
         raise RunFileError(
             f"'{file}': needs a ring, got neither a scene nor the attribute 'ring'; give --scene, e.g. --scene case-3,"

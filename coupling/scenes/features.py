@@ -162,7 +162,7 @@ def _springs(s):
     """What stands for the ground under a ring that answers pressures, where the lining has given way already."""
     kinds = {s.lining_of(tunnel) for tunnel in s.tunnels}
     if "jointed" in kinds:
-        return "; a jointed lining has given way to the ground: no soil springs"
+        return "; a jointed lining moves in the ground: its forces are those that it has there"
     twice = "; soil springs count twice what an elastic lining gave way: see its own forces in /lining"
     return twice if "elastic" in kinds else ""
 

@@ -115,16 +115,11 @@ def ring_of(scene: Scene, tunnel: int) -> Ring:
         raise SceneError(f"scene '{scene.name}', ring of tunnel {tunnel}: {said}") from None
 
 
-def answering_ring(scene: Scene, tunnel: int) -> Ring:
-    """The ring of a tunnel as it answers the pressures there: of a jointed lining alone, without soil springs.
-
-    It has given way to the ground already, whose answer is in the pressures: springs would count it twice. What is
-    left out of balance accelerates it. Raises SceneError: as :func:`ring_of`.
-    """
-    ring = ring_of(scene, tunnel)
-    if ring.ground is None or not scene.tunnels or scene.lining_of(scene.tunnels[tunnel]) != "jointed":
-        return ring
-    return ring.model_copy(update={"ground": None, "support": "inertia"})
+def moved_by(scene: Scene, tunnel: int) -> str | None:
+    """Lining model of the ring that has moved in the ground as the lining of a tunnel; None where none has."""
+    if not scene.tunnels or scene.lining_of(scene.tunnels[tunnel]) != "jointed":
+        return None
+    return scene.tunnels[tunnel].lining_model
 
 
 def limits_at(scene: Scene, tunnel: int, limits: Limits | None) -> Limits | None:

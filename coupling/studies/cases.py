@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from coupling.refused import SceneError
+from coupling.refused import Refused, SceneError
 from coupling.scenes.layers import changed, nested, read_scene_data
 from coupling.scenes.scene import Scene, make_scene
 from coupling.studies.design import AS_IT_IS, Study, StudyError, short_names, value_text
@@ -62,11 +62,13 @@ def cases(study: Study) -> list[Case]:
     return list(found.values())
 
 
-def check_backends(study: Study):
+def check_backends(study: Study, todo: list[Case]):
     """Refuse lining models that are not there before anything runs; a study that ran is read without them.
 
-    Raises StudyError: an unknown model, or the same one twice.
+    Raises StudyError: an unknown model, the same one twice, or another than has moved the ring of a case.
     """
+    from coupling.responses.respond import check_backend
+    from coupling.scenes.rings import moved_by
     from structure.models import lining_model, lining_model_names, model_name
 
     try:
@@ -78,6 +80,13 @@ def check_backends(study: Study):
     names = [model_name(backend) for backend in study.backends]
     if len(set(names)) < len(names):
         raise StudyError(f"study '{study.name}': backends: must differ, got {', '.join(names)}; name each once")
+    moved = {moved_by(case.scene, tunnel) for case in todo for tunnel in range(len(case.scene.tunnels))}
+    try:
+        for backend in study.backends:
+            for model in moved:
+                check_backend(backend, model)
+    except Refused as problem:
+        raise StudyError(f"study '{study.name}': backends: {problem}") from None
 
 
 def _value_in(scene, name):

@@ -69,8 +69,8 @@ def study(
     """
     _check_arguments(out, workers)
     plan = load_study(what)
-    check_backends(plan)
     todo = cases(plan)
+    check_backends(plan, todo)
     folder = study_folder(what, plan, out)
     tell = progress if progress is not None else lambda line: None
     try:

@@ -396,8 +396,8 @@ class MovingLinings:
         -------
         dict of str to (n,) float64
             displacement_radial, displacement_tangential [m], outward and clockwise; of a ring that deforms axial_force,
-            shear_force [N/m], bending_moment [N m/m]; (n_joints,) of a jointed one joint_opening, joint_dislocation
-            [m], joint_rotation [rad]. Zero and empty for a fixed lining.
+            shear_force [N/m], bending_moment [N m/m]; (n_joints,) of a jointed one what its `joints` gives. Zero and
+            empty for a fixed lining.
         """
         part = next((part for part in self.parts if part.tunnel == tunnel), None)
         a = np.radians(theta)
@@ -412,9 +412,8 @@ class MovingLinings:
         if hasattr(part.ring, "internal_forces"):
             forces = part.ring.internal_forces(part.displacement, a)
             result |= dict(zip(("axial_force", "shear_force", "bending_moment"), forces, strict=True))
-        if hasattr(part.ring, "jumps"):
-            moved = part.ring.jumps @ part.displacement
-            result |= dict(zip(("joint_opening", "joint_dislocation", "joint_rotation"), moved.T, strict=True))
+        if hasattr(part.ring, "joints"):
+            result |= part.ring.joints(part.displacement, part.memory)
         return result
 
 

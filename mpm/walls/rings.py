@@ -38,8 +38,9 @@ class LiningRing:
     Notes
     -----
     Any object may stand for a lining that has these, `outer_radius` [m] and `motion`; `internal_forces` where it knows
-    them; `jumps` (n_joints, 3, m) where it has joints. Joints that are not part of the stiffness feel `moves` (n, m) of
-    the coordinates, and are solved by
+    them; `jumps` (n_joints, 3, m) where it has joints, and `joints`, which gives movements and forces by their names,
+    from displacement and memory. Joints that are not part of the stiffness feel `moves` (n, m) of the coordinates, and
+    are solved by
 
     joints_between(flexibility, free, start, memory) : forces with which moves = free - flexibility forces, from a start
         nearby, and what the joints remember then: (n,), (n_joints,) float64; ArithmeticError where there are none

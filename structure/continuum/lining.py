@@ -15,7 +15,7 @@ from structure.continuum.face import spring_feelers, traction_operator
 from structure.continuum.joints import face_points, joint_jumps, nodes_from_unknowns, uneven_stiffness
 from structure.continuum.mesh import EDGE_MEAN, ContinuumMesh, GasketGroove, Gate
 from structure.continuum.sections import section_displacements, section_forces
-from structure.discrete import SIDES, DiscreteLining, Readings, States, one_thread
+from structure.discrete import SIDES, DiscreteLining, Readings, one_thread
 from structure.joint_laws import FaceLaw, JointLaw, bolt_law
 from structure.lining import THETA, origin
 from structure.pressures import check_pressures
@@ -244,11 +244,11 @@ class ContinuumLining(DiscreteLining):
         sides = [section_displacements(self.mesh, place, ring.centre_radius)[0] for place in places]
         return (sides[0] + sides[1]) / 2
 
-    def joint_fields(self, states: States) -> dict[str, np.ndarray]:
-        fields = super().joint_fields(states)
+    def joint_fields(self, displacements: np.ndarray, slips: np.ndarray) -> dict[str, np.ndarray]:
+        fields = super().joint_fields(displacements, slips)
         if self.joint == "equivalent_strip":
             for name, part in zip(FORCES, self._strip_forces, strict=True):
-                fields[f"joint_{name}"] = (part @ states.displacements.T).T
+                fields[f"joint_{name}"] = (part @ displacements.T).T
         return fields
 
     def details(self) -> dict[str, str | float]:

@@ -8,6 +8,12 @@ from test_peer_opensees import ask_opensees
 
 import coupling
 import mpm
+from coupling.datasets import read_pressures, read_response
+from coupling.refused import Refused
+from coupling.responses.comparison import compare
+from coupling.responses.respond import respond
+from coupling.responses.source import read_source
+from coupling.studies.design import StudyError
 from structure import BeamSpringLining, Ground, theory
 from verification.problems.exact_jointed_rings import ElasticGround, HingedRing, ring_in_ground
 from verification.problems.exact_rings import einstein_schwartz_full_slip_moment, einstein_schwartz_no_slip_moment
@@ -126,6 +132,8 @@ def test_joints_that_open_and_close_gain_no_energy(stiffness):
 
 
 GAPING = {"joint_contact_only": True, "joint_contact_height": 0.3}
+HINGED = {"joint_rotational_stiffness": 0.0}
+BOLTED = {"joint_bolts": {"offset": 0.05, "length": 0.4, "stiffness": 2e8, "preload": 1e5}}
 
 
 @pytest.mark.parametrize("laws", [{}, GAPING], ids=["linear", "gaping"])
@@ -168,7 +176,7 @@ def test_energy_of_the_ring_grows_by_what_ground_and_weight_do(laws):
 def twins(**changes):
     """Solver of two tunnels side by side, relaxed, each with its own jointed ring."""
     scene = coupling.load_scene(
-        "twin-tunnels", lining="jointed", initial_contact="bonded", numerics={"relaxation_tolerance": 1e-4},
+        "twin-tunnels", lining="jointed", initial_contact="bonded", numerics={"relaxation_tolerance": 1e-7},
         discretisation=COARSE | {"element_size_lining": 0.6}, **changes,
     )  # fmt: skip
     solver = mpm.Solver(scene, mpm.build_mesh(scene), threads=1)
@@ -179,7 +187,8 @@ def twins(**changes):
 def test_rings_of_twin_tunnels_are_mirror_images():
     solver = twins(gate="none", stop={"time": 1.0})
     left, right = (solver.moving.motion_at(tunnel, np.arange(360.0)) for tunnel in (0, 1))
-    for name, most in (("displacement_radial", 0.002), ("axial_force", 0.005), ("bending_moment", 0.01)):
+    # measured 0.19, 0.26, 0.64 %: the mesh is no mirror image
+    for name, most in (("displacement_radial", 0.003), ("axial_force", 0.005), ("bending_moment", 0.01)):
         mirrored = np.roll(right[name][::-1], 1)
         assert left[name] == pytest.approx(mirrored, abs=most * np.abs(mirrored).max())
 
@@ -257,15 +266,53 @@ def test_any_ring_is_followed_or_refused_with_the_reason():
     assert any(ends) and not all(ends)
 
 
-def test_response_to_the_pressures_of_a_jointed_lining_is_its_own(tmp_path):
-    # soil springs would count the ground's answer twice: at 100 kg/m M is 15 to 45 % low with them
+@pytest.mark.parametrize(
+    ("model", "ring"),
+    [("beam-spring", GAPING), ("beam-spring", HINGED), ("continuum", BOLTED)],
+    ids=["gaping", "hinged", "bolted continuum"],
+)
+def test_response_of_a_jointed_lining_is_what_it_carried_in_the_ground(tmp_path, model, ring):
+    scene = coupling.load_scene("quick", lining="jointed", ring=ring, stop={"time": 1e-3})
+    tunnel = scene.tunnels[0].model_copy(update={"lining_model": model})
+    scene = scene.model_copy(update={"tunnels": (tunnel,)})
+    coupling.run(scene, tmp_path / "run", response=True)
+    own = coupling.read_run(tmp_path / "run")["lining"].to_dataset()
+    found = read_response(tmp_path / "run", model)
+    for name in ("axial_force", "shear_force", "bending_moment", "joint_rotation", "joint_bending_moment"):
+        np.testing.assert_array_equal(found[name], own[name])
+    assert found.attrs["model"] == model and "equilibrium_residual" not in found
+    # a section at a joint carries what the joint does with its bolts; with eight harmonics of the pressures M is off by
+    # 7 % of the largest beside a hinge (16: 2 %)
+    at = {"theta": own["joint_angle"].values}
+    assert own["joint_axial_force"].values == pytest.approx(own["axial_force"].interp(at).values, rel=0.02)
+    moment, largest = own["bending_moment"].interp(at).values, np.abs(own["bending_moment"]).max().item()
+    assert own["joint_bending_moment"].values == pytest.approx(moment, abs=0.08 * largest)
+    # the mean of the outer face goes with the ring: up, since it is lighter than the ground that it displaces
+    assert (found["settlement"] < 0).all() and (found["convergence_vertical"] > 0).all()
+
+
+def test_response_of_a_jointed_lining_at_rest_is_that_of_the_ring_alone(tmp_path):
     scene = coupling.load_scene("quick", lining="jointed", ring=GAPING, stop={"time": 1e-3})
     coupling.run(scene, tmp_path / "run", response=True)
-    own = coupling.read_run(tmp_path / "run")["lining"].to_dataset().isel(time=0)
-    found = coupling.datasets.read_response(tmp_path / "run", "beam-spring").isel(time=0)
-    # at rest; the ring of few coordinates knows its pressures by eight harmonics
+    own = read_response(tmp_path / "run", "beam-spring").isel(time=[0])
+    alone = scene.ring.model_copy(update={"ground": None, "support": "invert"})
+    found = BeamSpringLining(alone).respond(read_pressures(tmp_path / "run").isel(time=[0]))
+    # the ring of few coordinates knows its pressures by eight harmonics; near the invert the clamp takes what is left
+    away = np.abs(found["theta"].values - 180) > 20
     for name, most in (("axial_force", 0.01), ("bending_moment", 0.05)):
-        expected = own[name].interp(theta=found["theta"]).values
-        assert found[name].values == pytest.approx(expected, abs=most * np.nanmax(np.abs(expected)), nan_ok=True)
-    turned = own["joint_rotation"].values
-    assert found["joint_rotation"].values == pytest.approx(turned, abs=0.12 * np.abs(turned).max())
+        expected = found[name].values[0, away]
+        assert own[name].values[0, away] == pytest.approx(expected, abs=most * np.abs(expected).max())
+
+
+def test_a_jointed_lining_is_not_answered_by_another_model(tmp_path):
+    scene = coupling.load_scene("quick", lining="jointed", stop={"time": 1e-3})
+    coupling.run(scene, tmp_path / "run")
+    with pytest.raises(Refused, match="must be 'beam-spring', which has moved this ring"):
+        respond(scene, read_pressures(tmp_path / "run"), "continuum")
+    with pytest.raises(Refused, match="run the scene with each lining_model"):
+        compare(read_source(tmp_path / "run"))
+    with pytest.raises(StudyError, match="backends: lining model 'continuum': must be 'beam-spring'"):
+        coupling.study(
+            {"name": "both", "parameters": {"gate.width": [0.2]}, "fixed": {"lining": "jointed"},
+             "backends": ("beam-spring", "continuum")}, tmp_path / "study",
+        )  # fmt: skip

@@ -212,14 +212,3 @@ def test_theoretical_pressures_sum_to_buoyancy_and_lost_overburden(model):
     # Stresses in equilibrium with their weight: the circle lifts with the weight of what it displaces (Archimedes).
     # 2e-4: one-degree samples, linear in between.
     assert response["balanced_uplift"].item() == pytest.approx(np.pi * 3.3**2 * (8900.0 + 9810.0), rel=2e-4)
-
-
-@BOTH
-def test_inertia_bears_what_accelerates_a_ring(model):
-    moves = ring(support="inertia")
-    balanced = model(moves).respond(tractions(lambda a: 3e5 + 1e5 * np.cos(2 * a)))
-    pushed = model(moves).respond(tractions(lambda a: 3e5 + 1e5 * np.cos(2 * a) + 2e4 * np.sin(a)))
-    for name in ("axial_force", "shear_force", "bending_moment"):
-        largest = np.abs(balanced[name]).max().item()
-        assert pushed[name].values == pytest.approx(balanced[name].values, abs=1e-6 * largest)
-    assert pushed["unborne_resultant"].item() > 0.01 > 1e-9 > balanced["unborne_resultant"].item()
