@@ -11,7 +11,7 @@ import mpm
 import mpm.scene
 from mpm.fields import CONTACT_RECORD, FIXED_X, FIXED_Y, block, numbers, values
 from mpm.state import restore_solver, solver_state
-from mpm.walls.moving_lining import STATE_RECORD, reaction_kernel
+from mpm.walls.ring_balance import STATE_RECORD, reaction_kernel
 from mpm.walls.rings import ElasticRing, RigidRing
 from verification.problems import exact_rings
 from verification.small_event import small_scene
