@@ -32,7 +32,7 @@ for factor in map(float, sys.argv[1:]):
 EVENT = """
 import hashlib, inspect
 import mpm
-import mpm.machine.team, mpm.time_step.spectrum, mpm.points, mpm.relaxation
+import mpm.machine.team, mpm.time_step.krylov, mpm.points, mpm.relaxation
 import sys; sys.path.insert(0, "tests")
 from verification.small_event import small_scene
 scene = small_scene()
@@ -41,10 +41,10 @@ solver.relax()
 solver.open_gate()
 for _ in range(40):
     solver.step()
-modules = mpm.machine.team, mpm.time_step.spectrum, mpm.points, mpm.relaxation
+modules = mpm.machine.team, mpm.time_step.krylov, mpm.points, mpm.relaxation
 kernels = [v for m in modules for v in vars(m).values()]
 kernels += [solver._long_step, *inspect.getclosurevars(solver._long_step.py_func).nonlocals.values()]
-kernels += [mpm.time_step.spectrum.krylov_kernel(solver.needs)]
+kernels += [mpm.time_step.krylov.krylov_kernel(solver.needs)]
 kernels = {k.py_func.__qualname__: k for k in kernels if hasattr(k, "py_func")}
 print(len(kernels), max(len(k.signatures) for k in kernels.values()),
       *(name for name, k in kernels.items() if k.stats.cache_misses))
