@@ -1,25 +1,17 @@
 """The command line `gush`: its own commands, and those that packages join."""
 
+from importlib import import_module
 from typing import Annotated
 
 import typer
 
-from coupling.commands.compare import compare_command
-from coupling.commands.export import export_command
-from coupling.commands.fit import fit_command
-from coupling.commands.info import info_command
-from coupling.commands.init import init_command
 from coupling.commands.joined import JoinedCommands
-from coupling.commands.misfit import misfit_command
-from coupling.commands.plan import plan_command
-from coupling.commands.report import report_command
-from coupling.commands.rerun import rerun_command
-from coupling.commands.respond import respond_command
-from coupling.commands.run import run_command
-from coupling.commands.scenes import scenes_command
-from coupling.commands.schema import schema_command
-from coupling.commands.study import study_command
-from coupling.commands.watch import watch_command
+
+#: Commands in the order of the help: each a module of `coupling.commands` with a function NAME_command.
+COMMANDS = (
+    "run", "watch", "rerun", "plan", "respond", "compare", "misfit", "scenes", "init", "schema", "report", "export",
+    "info", "study", "fit",
+)  # fmt: skip
 
 app = typer.Typer(
     cls=JoinedCommands,
@@ -29,21 +21,8 @@ app = typer.Typer(
     help="Water and soil gushing into a shield tunnel: two-phase MPM, lining pressures, forces in the ring.",
     epilog="Exit codes: 0 done, 1 rerun differs, 2 refused input, 3 run failed, 130 interrupted.",
 )
-app.command("run")(run_command)
-app.command("watch")(watch_command)
-app.command("rerun")(rerun_command)
-app.command("plan")(plan_command)
-app.command("respond")(respond_command)
-app.command("compare")(compare_command)
-app.command("misfit")(misfit_command)
-app.command("scenes")(scenes_command)
-app.command("init")(init_command)
-app.command("schema")(schema_command)
-app.command("report")(report_command)
-app.command("export")(export_command)
-app.command("info")(info_command)
-app.command("study")(study_command)
-app.command("fit")(fit_command)
+for name in COMMANDS:
+    app.command(name)(getattr(import_module(f"coupling.commands.{name}"), f"{name}_command"))
 
 
 def _tell_version(asked: bool):
