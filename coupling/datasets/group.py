@@ -1,22 +1,18 @@
 """One group of a netCDF-4 file, in memory, as xarray gives it, with every length looked up once.
 
 Whenever h5netcdf is asked for the length of an unlimited dimension it looks at all variables that have it, so that
-opening a group of n variables through xarray takes n² look-ups: seconds for the history of a run. And each look-up is a
-path through the file. So what netCDF writes into HDF5 is read here as it stands there, by h5py.
+opening a group of n variables through xarray takes n² look-ups: seconds for the history of a run. So it is asked here
+for dimensions and attributes only, and values and their lengths are read by h5py.
 """
 
 import contextlib
 
+import h5netcdf
 import h5py
 import numpy as np
 import xarray as xr
 
-NOT_A_VARIABLE = "This is a netCDF dimension but not a netCDF variable"  # as netCDF calls a scale without values
-#: Attributes that carry the format itself.
-OF_THE_FORMAT = frozenset((
-    "REFERENCE_LIST", "CLASS", "DIMENSION_LIST", "NAME", "_Netcdf4Dimid", "_Netcdf4Coordinates", "_nc3_strict",
-    "_NCProperties",
-))  # fmt: skip
+NO_COORDINATE = "_nc4_non_coord_"  # netCDF's prefix of a variable that is called as a dimension, but is not that one
 
 
 def read_group_at_once(file, group=None, choose=None):
@@ -33,81 +29,24 @@ def read_group_at_once(file, group=None, choose=None):
     Raises KeyError: no such group; OSError, RuntimeError, ValueError, AttributeError: from the libraries, for a damaged
     file.
     """
-    variables = {}
-    with _opened(file) as content:
-        attributes, declared, lengths = _declared(content, group)
-        for stored, dimensions, _ in declared.values():
-            for dimension, length in zip(dimensions, stored.shape, strict=True):
+    variables, lengths = {}, {}
+    opened = contextlib.nullcontext(file) if isinstance(file, h5py.File) else h5py.File(file, "r")
+    with opened as content, h5netcdf.File(content, "r") as described:
+        own = described[group] if group else described
+        held = content[own.name]
+        stored = {name: held.get(f"{NO_COORDINATE}{name}") or held[name] for name in own.variables}
+        dimensions = {name: variable.dimensions for name, variable in own.variables.items()}
+        for name, entry in stored.items():
+            for dimension, length in zip(dimensions[name], entry.shape, strict=True):
                 lengths[dimension] = max(lengths.get(dimension, 0), length)
         rows = None
-        if choose is not None and "time" in declared and declared["time"][1] == ("time",):
-            time = declared["time"][0]
-            rows = choose(_padded(time, time[()], (lengths["time"],)))
-        for name, (stored, dimensions, about) in declared.items():
-            variables[name] = _variable(stored, dimensions, about, lengths, rows)
+        if choose is not None and dimensions.get("time") == ("time",):
+            rows = choose(_padded(stored["time"], stored["time"][()], (lengths["time"],)))
+        for name, variable in own.variables.items():
+            variables[name] = _variable(stored[name], dimensions[name], dict(variable.attrs), lengths, rows)
+        attributes = dict(own.attrs)
     dataset = xr.decode_cf(xr.Dataset(variables, attrs=attributes), decode_times=False)
     return dataset.set_coords("time") if isinstance(rows, int) else dataset
-
-
-def _opened(file):
-    return contextlib.nullcontext(file) if isinstance(file, h5py.File) else h5py.File(file, "r")
-
-
-def _declared(file, group):
-    """Attributes of a group, its variables with their dimensions and attributes, and lengths of its dimensions."""
-    own = file[group or "/"]
-    stored = {name: entry for name, entry in own.items() if isinstance(entry, h5py.Dataset)}
-    about = {name: _attributes(entry) for name, entry in stored.items()}
-    scales = [name for name, attributes in about.items() if attributes.get("CLASS") == b"DIMENSION_SCALE"]
-    known = {stored[name].id: name for name in scales}
-    numbered = {about[name].get("_Netcdf4Dimid"): name for name in scales}
-
-    def scale_name(references):
-        if not len(references):
-            raise ValueError("a dimension without a scale")
-        scale = h5py.h5r.dereference(references[-1], file.id)
-        if scale not in known:  # of a group above
-            known[scale] = h5py.h5i.get_name(scale).decode().rpartition("/")[2]
-        return known[scale]
-
-    def dimensions(name):
-        attributes, count = about[name], stored[name].ndim
-        if "DIMENSION_LIST" in attributes:
-            return tuple(map(scale_name, attributes["DIMENSION_LIST"]))
-        if name in scales:
-            return (name,) if count == 1 else tuple(numbered[n] for n in attributes["_Netcdf4Coordinates"])
-        if count:
-            raise ValueError(f"variable '{name}' has no dimensions")
-        return ()
-
-    variables = {
-        name: (stored[name], dimensions(name), _texts(attributes))
-        for name, attributes in about.items()
-        if NOT_A_VARIABLE not in str(attributes.get("NAME"))
-    }
-    return _texts(_attributes(own)), variables, {name: stored[name].shape[0] for name in scales}
-
-
-def _attributes(entry):
-    attributes = entry.attrs
-    return {name: attributes[name] for name in attributes if name != "REFERENCE_LIST"}  # long, and of no use here
-
-
-def _texts(attributes):
-    return {name: _text(name, value) for name, value in attributes.items() if name not in OF_THE_FORMAT}
-
-
-def _text(name, value):
-    """As netCDF gives it: one value of a row of one, texts decoded."""
-    if isinstance(value, h5py.Empty):
-        return "" if value.dtype.kind == "S" else np.array([], value.dtype)
-    if isinstance(value, np.ndarray):
-        value = value[0] if len(value) == 1 else value.tolist() if value.dtype.kind in "SO" else value
-    if name == "_FillValue":
-        return value
-    if isinstance(value, list):
-        return [part.decode("utf-8") if isinstance(part, bytes) else part for part in value]
-    return value.decode("utf-8") if isinstance(value, bytes) else value
 
 
 def _variable(stored, dimensions, attributes, lengths, rows):
