@@ -41,8 +41,8 @@ def fit_command(
         from coupling.figures import RESOLUTION
         from coupling.figures.fit import fit_bands
         from coupling.fits.fit import TITLE, fit
-        from coupling.fits.prediction import shown
         from coupling.fits.summary import drawn, summary
+        from coupling.postprocess.extremes import shown_extreme
         from coupling.studies.progress import StudyLine
 
         folder = Path("fits") / Path(scene).stem if out is None else out
@@ -52,7 +52,7 @@ def fit_command(
             tell = partial(console.print, highlight=False, soft_wrap=True)
             found = fit(scene, measurements, priors, folder, workers, scheduler, tell, line)
         write_dataset(folder / DATA, found)
-        fit_bands(found, drawn(found), shown).savefig(folder / FIGURE, dpi=RESOLUTION)
+        fit_bands(found, drawn(found), shown_extreme).savefig(folder / FIGURE, dpi=RESOLUTION)
         data = {"scene": scene, "measurements": str(measurements), **summary(found),
                 "data": str(folder / DATA), "figure": str(folder / FIGURE)}  # fmt: skip
         _tell_doubts(data)

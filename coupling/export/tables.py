@@ -63,7 +63,7 @@ def run_tables(tree: xr.DataTree) -> dict[str, pd.DataFrame]:
             response = tree[structure_group(model, tunnel)].to_dataset()
             if response.sizes.get("time"):
                 name = f"{model.replace('-', '_')}{end}"
-                found[f"ring_{name}"] = _ring(response)
+                found[f"ring_{name}"] = _over(ring_extremes(response), ("time",))
                 found[f"forces_{name}"] = _ends(response, AROUND)
                 found[f"joints_{name}"] = _over(response[[n for n in JOINTS if n in response]], ("time", "joint"))
     surface = settled(tree["points"].to_dataset()) if "points" in tree.children else None
@@ -87,20 +87,6 @@ def _ends(dataset, names):
     """Quantities around the ring at the first and the last record."""
     ends = sorted({0, dataset.sizes["time"] - 1})
     return _over(dataset[[name for name in names if name in dataset]].isel(time=ends), ("time", "theta"))
-
-
-def _ring(response):
-    """Extremes of a ring, what has one value, and the largest of each utilisation, over time."""
-    about = {key: {"units": response[name].attrs.get("units", "1")} for key in ring_extremes(response)
-             for name in response.data_vars if key.startswith(name) and not key.endswith("_angle")}  # fmt: skip
-    series = {
-        key: ("time", values, about.get(key, {"units": "degree"})) for key, values in ring_extremes(response).items()
-    }
-    for name in UTILISATIONS:
-        if name in response:
-            series[name] = ("time", response[name].max([d for d in response[name].dims if d != "time"]).values)
-    coords = {"time": response["time"]} | {n: response[n] for n in ("inflow_mass",) if n in response}
-    return _over(xr.Dataset(series, coords), ("time",))
 
 
 def _place(at, prefix=""):

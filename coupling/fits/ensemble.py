@@ -75,11 +75,8 @@ def _curves(run, model):
     time = history["time"].values
     found = {"inflow_mass": np.maximum.accumulate(history["inflow_mass"].values)}
     if model in run.models():
-        response = read_response(run, model)
-        extremes = ring_extremes(response)
-        found |= {key: np.interp(time, response["time"], extremes[key]) for key in RING_EXTREMES if key in extremes}
-        for name in UTILISATIONS:
-            if name in response:
-                largest = response[name].max([dim for dim in response[name].dims if dim != "time"]).fillna(0.0)
-                found[name] = np.interp(time, response["time"], largest)
+        ring = ring_extremes(read_response(run, model))
+        ring = ring.assign({name: ring[name].fillna(0.0) for name in UTILISATIONS if name in ring})
+        told = (key for key in (*RING_EXTREMES, *UTILISATIONS) if key in ring)
+        found |= {key: np.interp(time, ring["time"], ring[key]) for key in told}
     return xr.Dataset({name: ("time", values) for name, values in found.items()}, coords={"time": time})

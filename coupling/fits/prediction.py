@@ -53,7 +53,7 @@ def predicted(
     for name, emulator in emulators.items():
         drawn = {key: emulator.draws(each, rng) for key, each in places.items()}
         bands = np.array([np.quantile(each, levels, axis=0).T for each in drawn.values()])
-        about = {"units": units(name), "long_name": shown(name)[0]}
+        about = {"units": units(name), "long_name": shown_extreme(name)[0]}
         result[name] = (("knowledge", "time", "level"), bands, about)
         for key in emulator.validation._fields:
             result[f"{name}_{key}"] = ("time", getattr(emulator.validation, key))
@@ -92,15 +92,6 @@ def sobol(plan: FitPlan, emulators: dict[str, Emulator]) -> xr.Dataset:
         found = {key: np.reshape(getattr(indices, key), shape) for key in found}
     coords = {"quantity": list(emulators), "parameter": list(plan.parameters)}
     return xr.Dataset({key: (tuple(coords), part, {"units": "1"}) for key, part in found.items()}, coords)
-
-
-def shown(name: str) -> tuple[str, str, float]:
-    """How people are shown a predicted quantity: label, unit, factor to it."""
-    if name == "inflow_mass":
-        return "inflow mass", "kg/m", 1.0
-    if name in UTILISATIONS:
-        return f"utilisation, {UTILISATIONS[name]}", "-", 1.0
-    return shown_extreme(name)
 
 
 def units(name: str) -> str:

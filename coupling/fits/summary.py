@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from coupling.fits.prediction import shown
 from coupling.measurements import QUANTITIES
+from coupling.postprocess.extremes import shown_extreme
 from structure.limits import UTILISATIONS
 
 #: Of the attributes of a fit.
@@ -39,7 +39,7 @@ def summary(found: xr.Dataset) -> dict[str, Any]:
     }  # fmt: skip
     data["predictions"] = {}
     for name in quantities:
-        label, unit, scale = shown(name)
+        label, unit, scale = shown_extreme(name)
         data["predictions"][name] = {"label": label, "unit": unit, "scale": scale, **_bands(last[name])}
     data["limits"] = {}
     for name in found["limit"].values.tolist() if "limit" in found.dims else ():
@@ -69,7 +69,7 @@ def _emulators(found):
         label, columns = f"measured {name}", {key: own[f"measured_{key}"].values for key in _WORST}
         rows[label] = (QUANTITIES[name].shown.unit, QUANTITIES[name].shown.scale, columns)
     for name in predictions(found):
-        _, unit, scale = shown(name)
+        _, unit, scale = shown_extreme(name)
         rows[name] = (unit, scale, {key: found[f"{name}_{key}"].values for key in _WORST})
     return {
         name: {"unit": unit, "scale": scale, **{key: float(worst(columns[key])) for key, worst in _WORST.items()}}

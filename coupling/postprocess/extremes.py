@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from structure.limits import UTILISATIONS
 from structure.response import FORCES, SHOWN
 
 
@@ -58,29 +58,44 @@ RING_EXTREMES = (
     *(f"{name}_{kind}" for name in FORCES for kind in ("max", "min")),
     "joint_opening_max", "joint_rotation_max", "convergence_horizontal", "convergence_vertical",
 )  # fmt: skip
+JOINTS = ("joint_opening", "joint_dislocation", "joint_rotation")
 
 
-def ring_extremes(response: xr.Dataset) -> dict[str, NDArray[np.float64]]:
-    """Extremes of a response over its records: keys of `RING_EXTREMES` as far as it has them, and KEY_angle of forces.
-
-    The largest rotation is that by size.
+def ring_extremes(response: xr.Dataset) -> xr.Dataset:
+    """What is told of a ring at each record.
 
     Parameters
     ----------
     response : xarray.Dataset
         Over time or another dimension.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over that dimension, as far as the response has them: those of `RING_EXTREMES`, joint_dislocation_max and
+        settlement, NAME_angle of forces, and the largest of each utilisation. Of dislocation and rotation it is the
+        largest size.
     """
-    found = {key: values.values for key, values in extremes(response).data_vars.items() if key != "inflow_mass"}
-    if response.sizes.get("joint"):
-        found["joint_opening_max"] = response["joint_opening"].max("joint").values
-        found["joint_rotation_max"] = abs(response["joint_rotation"]).max("joint").values
-    return found | {key: response[key].values for key in RING_EXTREMES if key in response}
+    found = extremes(response)
+    for name in JOINTS if response.sizes.get("joint") else ():
+        sizes = response[name] if name == "joint_opening" else abs(response[name])
+        found[f"{name}_max"] = sizes.max("joint", keep_attrs=True)
+    for name in ("convergence_horizontal", "convergence_vertical", "settlement", *UTILISATIONS):
+        if name in response:
+            found[name] = response[name].max(
+                [d for d in ("theta", "joint") if d in response[name].dims], keep_attrs=True
+            )
+    return found
 
 
 def shown_extreme(key: str) -> tuple[str, str, float]:
-    """How people are shown one of `RING_EXTREMES`: label, unit, factor to it."""
+    """How people are shown one of :func:`ring_extremes`, or the inflow mass beside it: label, unit, factor to it."""
+    if key == "inflow_mass":
+        return "inflow mass", "kg/m", 1.0
+    if key in UTILISATIONS:
+        return f"utilisation, {UTILISATIONS[key]}", "-", 1.0
     if key in SHOWN:
         return SHOWN[key].name, SHOWN[key].unit, SHOWN[key].scale
     name, _, kind = key.rpartition("_")
-    pick = "largest size" if name == "joint_rotation" else {"max": "largest", "min": "smallest"}[kind]
+    pick = "largest size" if name in JOINTS[1:] else {"max": "largest", "min": "smallest"}[kind]
     return f"{SHOWN[name].name}, {pick}", SHOWN[name].unit, SHOWN[name].scale

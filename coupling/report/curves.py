@@ -141,14 +141,8 @@ def ring_series(states):
     found = []
     for k in range(states.sizes.get("model", 0)):
         model = states.isel(model=k)
-        series = ring_extremes(model)
-        if "displacement_radial" in model:
-            shape = extremes(model, ("displacement_radial",)).data_vars
-            series |= {key: values.values for key, values in shape.items() if key != "inflow_mass"}
-        if model.sizes.get("joint"):
-            series["joint_dislocation_max"] = abs(model["joint_dislocation"]).max("joint").values
-        for name in (each for each in UTILISATIONS if each in model):
-            largest = model[name].max([dim for dim in model[name].dims if dim != "progress"]).values
-            series[name] = np.where(np.isfinite(largest), largest, np.nan)  # a chart has no infinity
-        found.append(series | ({"settlement": model["settlement"].values} if "settlement" in model else {}))
+        shape = [name for name in MOTION if name in model]
+        series = ring_extremes(model).merge(extremes(model, shape)).drop_vars("inflow_mass")
+        series = series.where(np.isfinite(series))  # a chart has no infinity
+        found.append({key: values.values for key, values in series.data_vars.items()})
     return found

@@ -14,9 +14,9 @@ from coupling.fits.emulator import Emulator
 from coupling.fits.ensemble import read_ensemble
 from coupling.fits.fit import LEVELS, observe
 from coupling.fits.posterior import Likelihood
-from coupling.fits.prediction import shown
 from coupling.fits.prior import places_of, read_plan
 from coupling.measurements.measurement import Measurement, error_covariance
+from coupling.postprocess.extremes import shown_extreme
 from coupling.studies.execute import study
 from verification.pages import docs_page, made_by, table
 from verification.small_event import small_scene
@@ -154,7 +154,7 @@ def coverage_rows(plan, found):
     rows.append(("most probable region of all", *(told([trial["region"] for trial in trials]) for trials in found)))
     for name in PREDICTED:
         inside = ([held(trial["predicted"][name]) for trial in trials] for trials in found)
-        rows.append((f"predicted {shown(name)[0]}", *map(told, inside)))
+        rows.append((f"predicted {shown_extreme(name)[0]}", *map(told, inside)))
     effective = ([trial["effective"] for trial in trials] for trials in found)
     rows.append(("effective places", *(f"{np.median(one):.0f}, {min(one):.0f} at least" for one in effective)))
     return rows
