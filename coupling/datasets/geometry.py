@@ -100,6 +100,11 @@ def tunnels_beside(dataset: xr.Dataset) -> list[int]:
     return [k for k in range(dataset.sizes.get("tunnel", 1)) if k != gate_tunnel(dataset)]
 
 
+def joints_of(response: xr.Dataset) -> NDArray[np.float64]:
+    """Angles of a response's joints [degree], none without joints."""
+    return response["joint_angle"].values if response.sizes.get("joint") else np.array([])
+
+
 def tunnels(dataset: xr.Dataset) -> NDArray[np.float64]:
     """Tunnels of a dataset, (n, 4) float64: x and y of the axis, outer and inner radius [m]."""
     return np.array(tunnel_list(dataset), float)

@@ -1,15 +1,16 @@
-"""What a run as a tree holds: its lining models, its records at some times."""
+"""What a run as a tree holds: answers of its lining models, its records at some times."""
 
 import numpy as np
+import xarray as xr
 
 from coupling.datasets.schema import structure_group
 
 
-def model_names(run, tunnel=None):
-    """Lining models by their users' names that answered for a tunnel (None: that with the gate), the leading first."""
+def responses_of(run: xr.DataTree, tunnel: int | None = None) -> dict[str, xr.Dataset]:
+    """Responses for a tunnel (None: that with the gate) by the users' names of their models, the leading one first."""
     home = structure_group("", tunnel).rstrip("/")
     answered = run[home].children if home in run.children else {}
-    return [str(response.attrs.get("model", group)) for group, response in answered.items()]
+    return {str(response.attrs.get("model", group)): response.to_dataset() for group, response in answered.items()}
 
 
 def match_times(available, wanted):

@@ -7,9 +7,9 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from coupling.datasets import read_run, structure_group
+from coupling.datasets import read_run
 from coupling.datasets.geometry import on_tunnel, tunnels_beside
-from coupling.datasets.tree import model_names
+from coupling.datasets.tree import responses_of
 from coupling.postprocess.answer import answers, settled
 from coupling.postprocess.extremes import ring_extremes
 from coupling.refused import Refused
@@ -59,8 +59,7 @@ def run_tables(tree: xr.DataTree) -> dict[str, pd.DataFrame]:
         end = "" if tunnel is None else f"_tunnel_{tunnel}"
         if "soil_pressure" in lining:
             found[f"pressures{end}"] = _ends(on_tunnel(lining, tunnel), PRESSURES)
-        for model in model_names(tree, tunnel):
-            response = tree[structure_group(model, tunnel)].to_dataset()
+        for model, response in responses_of(tree, tunnel).items():
             if response.sizes.get("time"):
                 name = f"{model.replace('-', '_')}{end}"
                 found[f"ring_{name}"] = _over(ring_extremes(response), ("time",))

@@ -4,9 +4,10 @@ import matplotlib
 import numpy as np
 from matplotlib.lines import Line2D
 
+from coupling.datasets.geometry import joints_of
 from coupling.figures.picture import legend_outside, styled
 from coupling.figures.polar import around_zero, at_time, closed_curve, crown_up
-from coupling.figures.tunnel import joints_of, mark_joints
+from coupling.figures.tunnel import mark_joints
 from structure.response import FORCES, SHOWN
 
 COLOURS, DASHES = ("0.25", "#c1272d"), ("-", (0, (4, 2)))

@@ -13,7 +13,7 @@ from coupling.datasets import (
     read_response,
     structure_group,
 )
-from coupling.datasets.geometry import has_tunnels, tunnels_beside
+from coupling.datasets.geometry import has_tunnels, joints_of, tunnels_beside
 from coupling.datasets.open_run import Run
 from coupling.figures.comparison import forces_compared
 from coupling.figures.ground import fields_around_tunnel, mesh_near_gate
@@ -21,7 +21,6 @@ from coupling.figures.history import inflow
 from coupling.figures.picture import RESOLUTION
 from coupling.figures.ring import deformed_ring, internal_forces, pressures_polar
 from coupling.figures.settlement import settlement_trough
-from coupling.figures.tunnel import joints_of
 from coupling.figures.utilisations import checks
 from coupling.postprocess.answer import settled
 

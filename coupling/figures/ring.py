@@ -8,10 +8,10 @@ import xarray as xr
 from matplotlib.patches import Annulus
 from numpy.typing import NDArray
 
-from coupling.datasets.geometry import gate_of, gate_tunnel, on_tunnel
+from coupling.datasets.geometry import gate_of, gate_tunnel, joints_of, on_tunnel
 from coupling.figures.picture import GATE, INITIAL, NOW, Picture, legend_outside, styled
 from coupling.figures.polar import around_zero, at_time, closed_curve, crown_up, radial_ticks
-from coupling.figures.tunnel import joints_of, mark_gate, mark_joints
+from coupling.figures.tunnel import mark_gate, mark_joints
 from coupling.postprocess.extremes import extremes
 from structure.response import FORCES, SHOWN
 

@@ -29,11 +29,6 @@ def mark_gate(axis, dataset):
         axis.plot(np.radians(gate.angle), axis.get_ylim()[1], "v", color=GATE, ms=6, clip_on=False, label="gate")
 
 
-def joints_of(response):
-    """Angles of a response's joints [degree], none without joints."""
-    return response["joint_angle"].values if response.sizes.get("joint") else np.array([])
-
-
 def mark_joints(axis, angles):
     """Dotted lines with the joints' numbers in a polar diagram whose limits are set."""
     low, high = axis.get_ylim()

@@ -5,9 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from coupling.datasets import structure_group
 from coupling.datasets.geometry import has_tunnels, tunnel_list, tunnel_of, tunnels_beside
-from coupling.datasets.tree import model_names
+from coupling.datasets.tree import responses_of
 from coupling.postprocess.settlement import surface_settlement, trough
 from structure.passing import Place, utilisations
 from structure.response import SHOWN
@@ -60,13 +59,12 @@ def answers(tree: xr.DataTree) -> dict[int | None, Answer]:
     """Number of every tunnel on which a lining model has answered (None: that with the gate) to its answer."""
     found = {}
     for tunnel in (None, *tunnels_beside(tree["lining"])):
-        names = model_names(tree, tunnel)
-        responses = [tree[structure_group(name, tunnel)].to_dataset() for name in names]
-        responses = [one for one in responses if one.sizes.get("time")]
-        if responses:
+        answered = {model: one for model, one in responses_of(tree, tunnel).items() if one.sizes.get("time")}
+        if answered:
+            (model, *others), responses = answered, list(answered.values())
             limits = utilisations(responses[0])
             governing = max(limits, key=lambda name: limits[name]["largest"], default=None)
-            found[tunnel] = Answer(names[0], names[1 : len(responses)], limits, governing, largest_forces(responses))
+            found[tunnel] = Answer(model, others, limits, governing, largest_forces(responses))
     return found
 
 

@@ -1,14 +1,12 @@
 """What a page begins with: the governing check, the largest forces and what is known of their error, inflow, trough."""
 
-import json
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from coupling.datasets import structure_group
-from coupling.datasets.geometry import gate_of, gate_tunnel, has_tunnels, tunnel_list, tunnels_beside
-from coupling.datasets.tree import model_names
+from coupling.datasets.geometry import gate_of, gate_tunnel, has_tunnels, joints_of, tunnel_list, tunnels_beside
+from coupling.datasets.tree import responses_of
 from coupling.postprocess.answer import Answer, answers, settled
 from coupling.postprocess.limits import place_text, utilisation_text
 from coupling.postprocess.mesh_ladder import mesh_error
@@ -39,6 +37,7 @@ def answer_of_run(tree: xr.DataTree, ladder: xr.Dataset | None = None) -> dict[s
         number = gate_tunnel(lining) if tunnel is None else tunnel
         one = found.get(tunnel)
         governing, bad = governing_text(one)
+        joints = next((joints_of(response).tolist() for response in responses_of(tree, tunnel).values()), [])
         rings.append({
             "title": f"Tunnel {number}{', with the gate' if tunnel is None else ''}" if several else "The ring",
             "governing": governing,
@@ -47,7 +46,7 @@ def answer_of_run(tree: xr.DataTree, ladder: xr.Dataset | None = None) -> dict[s
             "rows": [] if one is None else [_row(extreme, ladder) for extreme in one.forces],
             "bases": [] if one is None else _bases(one, ladder),
             "drawing": ring_drawing(
-                tunnel_list(lining)[number], _joints(tree, tunnel), gate_of(lining) if tunnel is None else None
+                tunnel_list(lining)[number], joints, gate_of(lining) if tunnel is None else None
             ),
         })  # fmt: skip
     return {"rings": rings, "facts": [*_inflow(tree), *_trough(tree)], "tables": []}
@@ -95,14 +94,6 @@ def _bases(answer, ladder):
     masses = ", ".join(f"{mass:g}" for mass in ladder["inflow_mass"].values)
     return [models, f"Mesh: how far the scene's mesh is from size zero, and the error bar of that, at the nearest of "
             f"{masses} kg/m of the ladder of {ladder.sizes['mesh']} meshes."]  # fmt: skip
-
-
-def _joints(tree, tunnel):
-    names = model_names(tree, tunnel)
-    if not names:
-        return []
-    response = tree[structure_group(names[0], tunnel)].to_dataset()
-    return list(json.loads(response.attrs["ring"])["joint_angles"]) if "ring" in response.attrs else []
 
 
 def _inflow(tree):

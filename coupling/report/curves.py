@@ -6,9 +6,8 @@ A run and a case of a study come in the same form, a dataset over `progress`, `m
 
 import numpy as np
 
-from coupling.datasets import structure_group
 from coupling.datasets.geometry import on_tunnel
-from coupling.datasets.tree import match_times, model_names
+from coupling.datasets.tree import match_times, responses_of
 from coupling.postprocess.extremes import extremes, ring_extremes
 from coupling.report.packing import evenly, levels
 from structure.limits import CHECK_VARIABLES, UTILISATIONS
@@ -41,9 +40,8 @@ def run_states(run, tunnel, records):
     if "soil_pressure" in lining:
         rows, _ = match_times(lining["time"].values, times)
         parts.append(on_tunnel(lining[list(PRESSURES)].isel(time=rows), tunnel))
-    answers, names = [], model_names(run, tunnel)
-    for name in names:
-        response = run[structure_group(name, tunnel)].to_dataset()
+    answers = []
+    for name, response in responses_of(run, tunnel).items():
         rows, present = match_times(response["time"].values, times)
         if present.any():
             left = {"inflow_mass", *CHECK_VARIABLES} - UTILISATIONS.keys()

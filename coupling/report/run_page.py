@@ -2,9 +2,9 @@
 
 import xarray as xr
 
-from coupling.datasets import RunFileError, identifier, opened, read_run, structure_group
+from coupling.datasets import RunFileError, identifier, opened, read_run
 from coupling.datasets.geometry import gate_of, gate_tunnel, tunnels_beside
-from coupling.datasets.tree import model_names
+from coupling.datasets.tree import responses_of
 from coupling.postprocess.limits import HEADS, limit_rows
 from coupling.postprocess.mesh_ladder import read_ladder
 from coupling.postprocess.summary import summarise_run
@@ -101,10 +101,11 @@ def _led_by(tree, model):
     """The tree with the responses of a model before those of the others; as it is for None."""
     if model is None:
         return tree
-    if model not in model_names(tree):
+    known = responses_of(tree)
+    if model not in known:
         raise Refused(
             f"--model: must be a lining model that has answered, got {model!r}; there are "
-            f"{', '.join(model_names(tree)) or 'none'}: run gush respond first"
+            f"{', '.join(known) or 'none'}: run gush respond first"
         )
     groups = tree.to_dict()
     first = {path: groups[path] for path in groups if path.rpartition("/")[2] == identifier(model) or path == "/"}
@@ -125,7 +126,7 @@ def _numbers(tree, answers):
     for tunnel, found in answers.items():
         of, key = ("", "") if tunnel is None else (f" of tunnel {tunnel}", f"tunnel_{tunnel}_")
         groups[f"Pressures on the lining{of}"] = pressure_numbers(tree["lining"].to_dataset(), tunnel)
-        names = model_names(tree, tunnel)
+        names = list(responses_of(tree, tunnel))
         groups[", ".join([f"Forces and deformation of the ring{of}", *names[:1]])] = ring_numbers(names, found, key)
     return {title: numbers for title, numbers in groups.items() if numbers}
 
@@ -134,8 +135,8 @@ def _limits(tree):
     """Utilisations of the first lining model of every tunnel as a table; no rows without limits."""
     rows = []
     for tunnel in (None, *tunnels_beside(tree["lining"])):
-        names, of = model_names(tree, tunnel), "" if tunnel is None else f", tunnel {tunnel}"
-        found = utilisations(tree[structure_group(names[0], tunnel)].to_dataset()) if names else {}
+        of = "" if tunnel is None else f", tunnel {tunnel}"
+        found = next((utilisations(response) for response in responses_of(tree, tunnel).values()), {})
         for (name, *cells), one in zip(limit_rows(found), found.values(), strict=True):
             rows.append(((f"{name}{of}", *cells), one["largest"] > 1))
     about = "Utilisations over all records, 1 is the limit; between records they are taken as linear in time."

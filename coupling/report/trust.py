@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from coupling.datasets import HISTORY, structure_group
+from coupling.datasets import HISTORY
 from coupling.datasets.geometry import tunnels_beside
-from coupling.datasets.tree import model_names
+from coupling.datasets.tree import responses_of
 from coupling.postprocess.quality import ERRORS, STATES, poor_errors
 from mpm.fields import CLAMPS
 
@@ -70,10 +70,11 @@ def quality(run, summary, scene=None):
     rows = [(ERRORS[name].label, ERRORS[name].text(values[name]), verdict)
             for name, verdict in summary["verdicts"].items()]  # fmt: skip
     rows += against_theory(run["lining"].to_dataset().isel(time=0), scene)
-    answers = [(model, k) for k in (None, *tunnels_beside(run["lining"])) for model in model_names(run, k)]
-    for model, tunnel in answers:
-        response = run[structure_group(model, tunnel)].to_dataset()
-        name = model if tunnel is None else f"{model}, tunnel {tunnel}"
+    answers = {
+        model if tunnel is None else f"{model}, tunnel {tunnel}": response
+        for tunnel in (None, *tunnels_beside(run["lining"])) for model, response in responses_of(run, tunnel).items()
+    }  # fmt: skip
+    for name, response in answers.items():
         if not response.sizes["time"]:
             continue
         if "equilibrium_residual" in response:
@@ -157,14 +158,14 @@ def run_warnings(run, attributes, quality_rows):
     ]  # fmt: skip
     lining = run["lining"].to_dataset()
     records = lining.sizes["time"]
-    models = model_names(run)
+    models = responses_of(run)
     if "soil_pressure" in lining and not models:
         found.append("No lining model has answered to the pressures: run `gush respond` on this run.")
     for tunnel in tunnels_beside(run["lining"]) if models else ():
-        if not model_names(run, tunnel):
+        if not responses_of(run, tunnel):
             found.append(f"No lining model has answered for tunnel {tunnel}: run `gush respond` on this run.")
-    for name in models:
-        answered = run[structure_group(name)].sizes.get("time", 0)
+    for name, response in models.items():
+        answered = response.sizes.get("time", 0)
         if answered != records:
             found.append(f"The response of {name} holds {answered} of {records} records: run `gush respond` again.")
     if "soil_pressure" in lining and records > 1:
