@@ -9,6 +9,7 @@ from coupling.export.animation import animation
 from coupling.export.grids import mesh_grids, point_grid, ring_series
 from coupling.export.tables import EXCEL_FILE, write_tables
 from coupling.export.tables import NAMES as TABLE_NAMES
+from coupling.export.xdmf import XdmfSeries
 from coupling.figures.of_run import NAMES as PICTURE_NAMES
 from coupling.figures.of_run import draw_run
 from coupling.files.folder import FIELDS, FIGURES, TABLES, made
@@ -97,8 +98,6 @@ def _write_vtu(stem, times, grids):
 
 
 def _write_xdmf(stem, times, grids):
-    from coupling.export.xdmf import XdmfSeries
-
     path = stem.with_suffix(".xdmf")
     with XdmfSeries(path) as series:
         for time, grid in zip(times, grids, strict=True):

@@ -1,8 +1,12 @@
 """Fields around the tunnel as an animation, one picture a snapshot."""
 
+import matplotlib
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from PIL import Image
 
 from coupling.datasets.geometry import has_tunnels
+from coupling.figures.ground import FIELD_COLOURS, common_tops, fields_around_tunnel
 from coupling.refused import Refused
 
 SECONDS_OF_ANIMATION, LONGEST_FRAME, LAST_FRAME = 6.0, 0.5, 1.5
@@ -10,11 +14,6 @@ SECONDS_OF_ANIMATION, LONGEST_FRAME, LAST_FRAME = 6.0, 0.5, 1.5
 
 def animation(points, path, mesh=None):
     """Fields around the tunnel, one picture a snapshot, colours the same at all times."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from PIL import Image
-
-    from coupling.figures import common_tops, fields_around_tunnel
-
     if not has_tunnels(points):
         raise Refused("export: an animation shows the surroundings of a tunnel, the scene has none; take vtu")
     tops, pictures = common_tops(points), []
@@ -32,11 +31,6 @@ def animation(points, path, mesh=None):
 
 def _palette():
     """The 256 colours that a GIF may have, the same for all pictures: even samples of the colour maps, and greys."""
-    import matplotlib
-    from PIL import Image
-
-    from coupling.figures.ground import FIELD_COLOURS
-
     greys = 24
     each = (256 - greys) // len(FIELD_COLOURS)
     maps = [matplotlib.colormaps[name](np.linspace(0, 1, each), bytes=True)[:, :3] for name in FIELD_COLOURS]

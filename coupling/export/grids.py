@@ -1,20 +1,16 @@
 """Points, mesh and rings of a run as grids for ParaView and PyVista, with what they hold."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import meshio
 import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
 
 from coupling.datasets.geometry import gate_tunnel, on_tunnel, tunnel_list
 from coupling.datasets.tree import match_times
-
-if TYPE_CHECKING:
-    import meshio
-    import xarray as xr
-    from numpy.typing import NDArray
-
+from coupling.postprocess.elements import cell_means, element_areas, element_of_points
 
 TENSOR = "stress"
 VECTORS = ("velocity_solid", "velocity_liquid", "displacement")
@@ -29,8 +25,6 @@ def point_grid(snapshot: xr.Dataset) -> meshio.Mesh:
 
     snapshot : xarray.Dataset, one time of `/points`.
     """
-    import meshio
-
     here = np.isfinite(snapshot["x"].values)
     data = {name: snapshot[name].values[here] for name in snapshot.data_vars if snapshot[name].dims == ("point",)}
     position = _vector(data.pop("x"), data.pop("y"))
@@ -50,10 +44,6 @@ def mesh_grids(snapshots: Iterable[xr.Dataset], mesh: xr.Dataset) -> Iterator[me
 
     snapshots : list of xarray.Dataset.
     """
-    import meshio
-
-    from coupling.postprocess.elements import cell_means, element_areas, element_of_points
-
     nodes, corners = _vector(mesh["x"].values, mesh["y"].values), mesh["element_nodes"].values
     area = element_areas(mesh)
     region, cells = mesh["region"].values, [("triangle", corners)]
@@ -125,8 +115,6 @@ def _ring_shape(tunnels, rings):
 
 def _ring_grid(shape, rings):
     """Rings at one time, with everything that they have for each angle."""
-    import meshio
-
     data = {}
     for k, ring in rings:
         values = {name: ring[name].values for name in ring.data_vars if ring[name].dims == ("theta",)}

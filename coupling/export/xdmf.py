@@ -6,6 +6,7 @@ meshio's own series keeps points and cells fixed, and material points move and l
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
+import h5py
 import numpy as np
 
 TOPOLOGIES = {"vertex": "Polyvertex", "triangle": "Triangle", "quad": "Quadrilateral"}
@@ -26,8 +27,6 @@ class XdmfSeries:
         self._series = ET.SubElement(domain, "Grid", Name="series", GridType="Collection", CollectionType="Temporal")
 
     def __enter__(self):
-        import h5py
-
         self._file = h5py.File(self.path.with_suffix(".h5"), "w")
         return self
 

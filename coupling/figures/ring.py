@@ -6,13 +6,13 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 from matplotlib.patches import Annulus
-from numpy.typing import NDArray
 
 from coupling.datasets.geometry import gate_of, gate_tunnel, joints_of, on_tunnel
 from coupling.figures.picture import GATE, INITIAL, NOW, Picture, legend_outside, styled
 from coupling.figures.polar import around_zero, at_time, closed_curve, crown_up, radial_ticks
 from coupling.figures.tunnel import mark_gate, mark_joints
 from coupling.postprocess.extremes import extremes
+from coupling.postprocess.ring_shape import centred
 from structure.response import FORCES, SHOWN
 
 
@@ -153,18 +153,6 @@ def _round_down(value):
     """1, 2 or 5 times a power of ten, at most `value`."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(power * max(step for step in (1, 2, 5) if step * power <= value * (1 + 1e-12)))
-
-
-def centred(
-    angle: NDArray[np.float64], radial: NDArray[np.float64], tangential: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Radial and tangential displacement (.., n) without the mean displacement of the ring, two of (.., n) float64."""
-    horizontal = np.mean(radial * np.sin(angle) + tangential * np.cos(angle), axis=-1, keepdims=True)
-    vertical = np.mean(radial * np.cos(angle) - tangential * np.sin(angle), axis=-1, keepdims=True)
-    return (
-        radial - horizontal * np.sin(angle) - vertical * np.cos(angle),
-        tangential - horizontal * np.cos(angle) + vertical * np.sin(angle),
-    )
 
 
 def _place(angle, radius, radial, tangential):

@@ -9,6 +9,7 @@ import io
 import json
 from pathlib import Path
 
+import h5py
 import numpy as np
 
 from coupling.files.replace import replace_file
@@ -31,8 +32,6 @@ def write_checkpoint(folder, state, about):
 
     Returns path: ``checkpoint-STEPS.h5``.
     """
-    import h5py
-
     image = io.BytesIO()
     with h5py.File(image, "w", userblock_size=BLOCK) as file:
         file.attrs["about"] = json.dumps(about)
@@ -60,8 +59,6 @@ def read_checkpoint(path):
 
     Raises CheckpointDamaged: truncated, changed, or no checkpoint at all.
     """
-    import h5py
-
     try:
         content = Path(path).read_bytes()
     except OSError as error:

@@ -1,5 +1,7 @@
 """An HDF5 file is data of its own: what would make the library read other files is refused before anything is read."""
 
+import h5py
+
 
 class ForeignContent(ValueError):
     """A file that shows the content of other files as its own."""
@@ -12,8 +14,6 @@ def require_own_content(group):
 
     Raises ForeignContent; OSError, KeyError, RuntimeError, ValueError: from the library.
     """
-    import h5py
-
     for name in group:
         link = group.get(name, getlink=True)
         if isinstance(link, h5py.ExternalLink):

@@ -6,6 +6,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from structure import additional
+
 
 def crossing_times(
     inflow_mass: NDArray[np.float64], time: NDArray[np.float64], masses: ArrayLike
@@ -151,8 +153,6 @@ def additional_at_inflow(response: xr.Dataset, inflow_mass: float) -> xr.Dataset
     ValueError
         When the run did not get there.
     """
-    from structure import additional
-
     return at_inflow(additional(response), inflow_mass)
 
 

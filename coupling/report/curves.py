@@ -5,10 +5,12 @@ A run and a case of a study come in the same form, a dataset over `progress`, `m
 """
 
 import numpy as np
+import xarray as xr
 
 from coupling.datasets.geometry import on_tunnel
 from coupling.datasets.tree import match_times, responses_of
 from coupling.postprocess.extremes import extremes, ring_extremes
+from coupling.postprocess.ring_shape import centred
 from coupling.report.packing import evenly, levels
 from structure.limits import CHECK_VARIABLES, UTILISATIONS
 from structure.lining import at_whole_degrees
@@ -32,8 +34,6 @@ def run_states(run, tunnel, records):
     Returns xarray.Dataset: pressures (progress, theta), histories (progress), responses (progress, model, theta or
     joint), NaN where a model has no record; time [s] and inflow_mass [kg/m] (progress).
     """
-    import xarray as xr
-
     history = run["history"].to_dataset().isel(time=records)
     parts, times = [history[[n for n in history.data_vars if history[n].dims == ("time",)]]], history["time"].values
     lining = run["lining"].to_dataset()
@@ -58,8 +58,6 @@ def run_states(run, tunnel, records):
 
 def shape_of_ring(states):
     """The states with the radial displacement of the ring's shape alone: what moves as a whole does not deform."""
-    from coupling.figures.ring import centred
-
     if "displacement_radial" not in states:
         return states
     radial, tangential = (states[f"displacement_{way}"].transpose(..., "theta") for way in ("radial", "tangential"))

@@ -3,20 +3,27 @@
 Charts are drawn by Apache ECharts, which is part of the page as its numbers are: it opens offline.
 """
 
-from __future__ import annotations
-
 import contextlib
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from coupling.datasets import run_file
+import jinja2
+from markupsafe import Markup, escape
+
+from coupling.datasets import RunFileError, run_file
 from coupling.files.folder import REPORT_FILE, RUN_FILE
 from coupling.files.replace import replace_file
 from coupling.refused import Refused
-
-if TYPE_CHECKING:
-    from coupling.studies.side_by_side import SideBySide
+from coupling.report import run_page, study_page
+from coupling.report.charts import COLUMNS, JOINT_COLUMNS, charts_of
+from coupling.report.numbers import shown as as_read
+from coupling.report.numbers import shown_error
+from coupling.report.packing import packed
+from coupling.studies.collect import stored_cases
+from coupling.studies.design import value_text
+from coupling.studies.folder import DATA_FILE, RUN_FOLDER, STUDY_FILE, case_file
+from coupling.studies.side_by_side import SideBySide
 
 MARK = '<meta name="generator" content="gushing report">'
 SCRIPTS = ("data.js", "charts.js", "ground.js", "tables.js", "player.js")
@@ -56,13 +63,9 @@ def write_report(
     """
     folder = study_folder(path)
     if folder is None:
-        from coupling.report import run_page
-
         target = _checked_path(run_file(path).parent, out)
         shown = run_page.collect(path, model, ladder)
     else:
-        from coupling.report import study_page
-
         if ladder is not None:
             raise Refused(f"--ladder: is of one run, '{path}' is a study; leave --ladder out")
         target = _checked_path(folder, out)
@@ -78,8 +81,6 @@ def write_runs_report(compared: SideBySide, out: str | Path) -> Path:
 
     Raises Refused: as :func:`write_report`.
     """
-    from coupling.report import study_page
-
     target = _checked_path(Path(out).parent, out)
     replace_file(target, rendered(study_page.collect_runs(compared, target.parent)))
     return target
@@ -90,14 +91,6 @@ def rendered(shown: dict[str, Any]) -> str:
 
     shown : dict from :func:`coupling.report.run_page.collect` or :func:`coupling.report.study_page.collect`.
     """
-    import jinja2
-    from markupsafe import Markup, escape
-
-    from coupling.report.charts import COLUMNS, JOINT_COLUMNS, charts_of
-    from coupling.report.numbers import shown as as_read
-    from coupling.report.numbers import shown_error
-    from coupling.report.packing import packed
-    from coupling.studies.design import value_text
 
     def worded(value):
         number = isinstance(value, int | float) and not isinstance(value, bool)
@@ -133,11 +126,6 @@ def rendered(shown: dict[str, Any]) -> str:
 
 def write_run_reports(folder: str | Path) -> list[Path]:
     """Write the pages of all runs of a study beside them; a run without a record gets none. Returns their paths."""
-    from coupling.datasets import RunFileError
-    from coupling.studies.case import RUN_FOLDER
-    from coupling.studies.collect import stored_cases
-    from coupling.studies.execute import case_file
-
     written = []
     for case in stored_cases(folder)[1]:
         run = case_file(Path(folder), case).parent / RUN_FOLDER
@@ -152,8 +140,6 @@ def study_folder(path: str | Path) -> Path | None:
 
     Raises Refused: a folder that holds neither or both.
     """
-    from coupling.studies.folder import DATA_FILE, STUDY_FILE
-
     path = Path(path)
     if not path.is_dir():
         return path.parent if path.is_file() and path.name in (STUDY_FILE, DATA_FILE) else None

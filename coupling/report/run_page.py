@@ -16,7 +16,7 @@ from coupling.report.numbers import inflow_numbers, pressure_numbers, ring_numbe
 from coupling.report.packing import evenly
 from coupling.report.trust import quality, run_warnings
 from coupling.runs.progress_line import duration
-from coupling.scenes.features import facts
+from coupling.scenes.features import facts, features
 from coupling.scenes.scene import parse_scene
 from structure.passing import utilisations
 
@@ -91,8 +91,6 @@ def read_scene(attributes):
 
 def left_out(scene):
     """What was active and what was left out: rows of :func:`coupling.scenes.features.features`."""
-    from coupling.scenes.features import features
-
     # the number of threads is no part of the scene and changes no result
     return [row for row in features(scene, 1) if row["feature"] != "several threads"]
 

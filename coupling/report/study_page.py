@@ -18,10 +18,9 @@ from coupling.responses.comparison import HEADS as DIFFERENCES
 from coupling.responses.comparison import difference_cells
 from coupling.runs.progress_line import duration
 from coupling.scenes.features import facts
-from coupling.studies.case import RUN_FOLDER
 from coupling.studies.collect import stored_cases, unreadable
 from coupling.studies.design import Range, StudyError, short_names, value_text
-from coupling.studies.execute import case_file
+from coupling.studies.folder import RUN_FOLDER, case_file
 from coupling.studies.limits import HEADS, governing_of_study, limit_rows, limits_of_case, limits_of_study
 from structure.lining import at_whole_degrees
 from structure.models import model_name

@@ -7,6 +7,7 @@ from coupling.datasets.geometry import tunnels_beside
 from coupling.datasets.tree import responses_of
 from coupling.postprocess.quality import ERRORS, STATES, poor_errors
 from mpm.fields import CLAMPS
+from structure import theoretical_pressures
 
 #: What it means that points meet a limit, by its name in :data:`mpm.fields.CLAMPS`.
 MEANINGS = {
@@ -37,8 +38,6 @@ def initial_theory(scene, theta):
     least, largest = scene.lateral_pressure_range(soil, tunnel.cover, tunnel.cover + tunnel.outer_diameter)
     if least < largest:
         return None
-    from structure import theoretical_pressures
-
     density = 0.0 if scene.water is None else scene.water.density
     return theoretical_pressures(
         outer_diameter=tunnel.outer_diameter,

@@ -1,15 +1,9 @@
 """Whether a scene fits into the memory that is free."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import psutil
 
 from coupling.refused import Refused
-
-if TYPE_CHECKING:
-    from mpm.scene import Scene as MpmScene
+from mpm.scene import Scene as MpmScene
 
 
 def check_memory(mpm_scene: MpmScene) -> None:

@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+import mpm
 from coupling.datasets import RunWriter
 from coupling.files.checkpoint import remove_checkpoints, write_checkpoint
 from coupling.files.folder import MESH_FILE, RUN_FILE, SCENE_FILE, how_to_go_on
@@ -49,8 +50,6 @@ class RecordedSimulation:
 
         Raises RunFailed, KeyboardInterrupt, OSError, MemoryError: with a note that says how to go on.
         """
-        import mpm
-
         try:
             self._prepare()
             asked = self._advance()
@@ -84,8 +83,6 @@ class RecordedSimulation:
 
     def _prepare(self):
         """Mesh, run file, and the simulation at its initial state or at its last checkpoint."""
-        import mpm
-
         attributes, scene = self.attributes, self.scene
         log.info("scene %s, %s, revision %s", scene.name, attributes["source"], attributes["revision"] or "unknown")
         replace_file(self.folder / SCENE_FILE, attributes["scene"])

@@ -1,13 +1,10 @@
 """What a scene is, what is computed in it, what is left out, and why, in words."""
 
-from __future__ import annotations
+from typing import Any
 
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from coupling.scenes.scene import Scene
-    from mpm.scene import Scene as MpmScene
-    from mpm.scene import Soil
+from coupling.scenes.scene import Scene
+from mpm.scene import Scene as MpmScene
+from mpm.scene import Soil
 
 
 def features(scene: Scene, threads: int, why_alone: str = "one thread") -> list[dict[str, Any]]:

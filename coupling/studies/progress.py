@@ -8,6 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
 from coupling.files.replace import replace_file
 from coupling.studies.folder import CASE_FILE, PROGRESS_FILE
 
@@ -100,8 +102,6 @@ class StudyLine:
     """The live lines of a study on a console of rich, if it is a terminal: the whole, and every case at work."""
 
     def __init__(self, console):
-        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
         columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
         self._bars = Progress(*columns, TimeRemainingColumn(), console=console, transient=True)
         self._shown: dict[int, object] = {}

@@ -4,8 +4,14 @@ from functools import partial
 
 import numpy as np
 
+from coupling.datasets import write_dataset
 from coupling.files.replace import replaced
+from coupling.studies.cases import cases
+from coupling.studies.design import load_study
+from coupling.studies.execute import study, study_folder
+from coupling.studies.folder import DATA_FILE
 from coupling.studies.limits import limits_of_case, limits_of_study
+from coupling.studies.progress import StudyLine
 from structure.models import model_name
 
 #: Keys of a case's result.
@@ -21,13 +27,6 @@ def run_study(name, out, workers, scheduler, console):
     utilisations of that model over the whole case, as :func:`coupling.studies.limits.limits_of_case`; limits: as
     :func:`coupling.studies.limits.limits_of_study`.
     """
-    from coupling.datasets import write_dataset
-    from coupling.studies.cases import cases
-    from coupling.studies.design import load_study
-    from coupling.studies.execute import study, study_folder
-    from coupling.studies.folder import DATA_FILE
-    from coupling.studies.progress import StudyLine
-
     plan = load_study(name)
     folder = study_folder(name, plan, out)
     with StudyLine(console) as line:

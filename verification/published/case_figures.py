@@ -4,7 +4,7 @@ import numpy as np
 
 from coupling import postprocess
 from coupling.figures.picture import styled
-from coupling.figures.ring import centred
+from coupling.postprocess.ring_shape import centred
 from verification.published.lining_figures import JOINTS, rings
 
 #: Group to the scenes in it, and what is said of a scene that sets it apart.
