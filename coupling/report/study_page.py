@@ -4,7 +4,6 @@ import os
 from pathlib import Path
 
 from coupling.datasets import RunFileError, read_attributes
-from coupling.datasets.group import read_group_at_once
 from coupling.files.folder import LOG_FILE, REPORT_FILE, RUN_FILE
 from coupling.postprocess.extremes import RING_EXTREMES
 from coupling.postprocess.quality import ERRORS
@@ -18,11 +17,10 @@ from coupling.responses.comparison import HEADS as DIFFERENCES
 from coupling.responses.comparison import difference_cells
 from coupling.runs.progress_line import duration
 from coupling.scenes.features import facts
-from coupling.studies.collect import stored_cases, unreadable
-from coupling.studies.design import Range, StudyError, short_names, value_text
+from coupling.studies.collect import read_case, stored_cases
+from coupling.studies.design import Range, short_names, value_text
 from coupling.studies.folder import RUN_FOLDER, case_file
 from coupling.studies.limits import HEADS, governing_of_study, limit_rows, limits_of_case, limits_of_study
-from structure.lining import at_whole_degrees
 from structure.models import model_name
 
 MOST_VALUES_NAMED = 6  # of a fact that differs between the cases
@@ -164,12 +162,9 @@ def _warnings(rows, lost):
 
 def _loaded(file, models):
     """The dataset of a case, in memory, with these lining models in their order."""
-    try:
-        dataset = at_whole_degrees(read_group_at_once(file), "theta_ring")
-        same = "model" not in dataset.dims or tuple(dataset["model"].values) == tuple(models)
-        return shape_of_ring(dataset if same else dataset.reindex(model=list(models)))
-    except (OSError, RuntimeError, ValueError, KeyError, AttributeError) as error:
-        raise StudyError(unreadable(file, error)) from None
+    dataset = read_case(file)
+    same = "model" not in dataset.dims or tuple(dataset["model"].values) == tuple(models)
+    return shape_of_ring(dataset if same else dataset.reindex(model=list(models)))
 
 
 def _row(case, states, answers, failure, run, beside):

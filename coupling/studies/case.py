@@ -135,13 +135,5 @@ def _at(dataset, times):
     """A dataset at some times, NaN where the time is NaN, with the dimension `progress` in place of time."""
     import xarray as xr
 
-    known, stored = np.isfinite(times), dataset["time"].values
-    times = np.where(known, times, stored[0])
-    after = np.minimum(np.searchsorted(stored, times), len(stored) - 1)
-    before = np.maximum(after - 1, 0)
-    width = np.where(after > before, stored[after] - stored[before], 1.0)
-    share = xr.DataArray((times - stored[before]) / width, dims="progress")
-    values = dataset.drop_vars("time")
-    low, high = (values.isel(time=xr.DataArray(rows, dims="progress")) for rows in (before, after))
-    with xr.set_options(keep_attrs=True):
-        return (low + share * (high - low)).where(xr.DataArray(known, dims="progress"))
+    plain = dataset.drop_vars(set(dataset.coords) & {"inflow_mass"})
+    return plain.interp(time=xr.DataArray(times, dims="progress"), assume_sorted=True).drop_vars("time")

@@ -30,17 +30,9 @@ def collect(plan: Study, cases: list[Case], folder: Path, failures: dict[str, st
     Raises coupling.studies.design.StudyError: the file of a case is damaged.
     """
     there = [case for case in cases if case_file(folder, case).is_file()]
-    parts, files = [], [case_file(folder, case) for case in there]
+    files = [case_file(folder, case) for case in there]
     small = sum(file.stat().st_size for file in files) < MOST_BYTES_IN_MEMORY
-    for file in files:
-        try:
-            if small:
-                part = read_group_at_once(file)
-            else:
-                part = xr.open_dataset(file, engine="h5netcdf", chunks={}, decode_timedelta=False)
-            parts.append(at_whole_degrees(part, "theta_ring"))  # as earlier versions called the angles of the ring
-        except (OSError, RuntimeError, ValueError, KeyError, AttributeError) as error:
-            raise StudyError(unreadable(file, error)) from None
+    parts = [read_case(file, small) for file in files]
     result = xr.Dataset(coords={"case": np.array([], int)})
     if parts:
         result = xr.concat(
@@ -83,9 +75,21 @@ def _column(values):
     return np.array(["none" if value is None else str(value) for value in values])
 
 
-def unreadable(file: Path, error: Exception) -> str:
-    """What to do about the damaged file of a case."""
-    return f"case '{file}': damaged ({type(error).__name__}); delete this file and repeat `gush study`"
+def read_case(file: Path, in_memory: bool = True) -> xr.Dataset:
+    """The dataset of a case; one that is not in memory is loaded when used.
+
+    Raises coupling.studies.design.StudyError: the file is damaged.
+    """
+    try:
+        if in_memory:
+            case = read_group_at_once(file)
+        else:
+            case = xr.open_dataset(file, engine="h5netcdf", chunks={}, decode_timedelta=False)
+        return at_whole_degrees(case, "theta_ring")  # as earlier versions called the angles of the ring
+    except (OSError, RuntimeError, ValueError, KeyError, AttributeError) as error:
+        raise StudyError(
+            f"case '{file}': damaged ({type(error).__name__}); delete this file and repeat `gush study`"
+        ) from None
 
 
 def _of_scenes(cases):
