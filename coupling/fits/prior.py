@@ -8,12 +8,11 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from coupling.scenes.layers import read_toml_file
-from coupling.studies.design import Range, Study, in_units, plan_of
+from coupling.studies.design import Range, Study, of_parameter, plan_of
 from mpm.scene import Part
-from structure.inputs import mistakes
 
 #: Standard deviations from its middle within which a normal prior is taken: 99.7 % of it.
 REACH = 3.0
@@ -195,8 +194,4 @@ def _prior(name, table):
         raise ValueError(
             f"{name}: must be a table of bounds or of a distribution, got {table!r}; {{low = .., high = ..}}"
         )
-    try:
-        return Prior.model_validate(in_units(name, table, IN_UNIT))
-    except ValidationError as error:
-        said = "; ".join(": ".join([*map(str, where), message]) for where, message in mistakes(error, Prior))
-        raise ValueError(f"{name}: {said}") from None
+    return of_parameter(Prior, name, table, IN_UNIT)

@@ -94,7 +94,7 @@ class Study(Part):
         for name, values in parameters.items():
             values = values.tolist() if hasattr(values, "tolist") else values
             if isinstance(values, dict):
-                values = _range(name, values)
+                values = of_parameter(Range, name, values, ("low", "high"), "must be a list of values or a range; ")
             elif not isinstance(values, list | tuple | Range):
                 raise ValueError(f"{name}: must be a list of values or a range, got {values!r}; write [{values!r}], or "
                                  "give it under fixed")  # fmt: skip
@@ -225,20 +225,17 @@ def study_names() -> list[str]:
     return ready_names("studies")
 
 
-def _range(name, table):
-    try:
-        return Range.model_validate(in_units(name, table, ("low", "high")))
-    except ValidationError as error:
-        said = "; ".join(": ".join([*map(str, where), message]) for where, message in mistakes(error, Range))
-        raise ValueError(f"{name}: must be a list of values or a range; {said}") from None
+def of_parameter(model: type[Plan], name: str, table: dict[str, Any], keys: tuple[str, ...], rule: str = "") -> Plan:
+    """What a table says of the parameter of a dotted name, the numbers under some keys in its unit.
 
-
-def in_units(name: str, table: dict[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:
-    """A table with the numbers under some keys in the unit of the parameter of that dotted name.
-
-    Raises ValueError: no quantity, or of another dimension.
+    Raises ValueError: no quantity, or of another dimension; or every other mistake, behind `rule`.
     """
     try:
-        return {key: number_in_unit(name, value) if key in keys else value for key, value in table.items()}
+        numbers = {key: number_in_unit(name, value) if key in keys else value for key, value in table.items()}
     except ValueError as problem:
         raise ValueError(f"{name}: {problem}") from None
+    try:
+        return model.model_validate(numbers)
+    except ValidationError as error:
+        said = "; ".join(": ".join([*map(str, where), message]) for where, message in mistakes(error, model))
+        raise ValueError(f"{name}: {rule}{said}") from None
