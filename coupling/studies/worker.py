@@ -15,7 +15,7 @@ from multiprocessing.connection import Connection
 #: What a case needs and takes long to load; none of it starts a thread.
 LOADED = (
     "coupling.runs.run", "coupling.studies.case", "mpm.mesh.build", "mpm.simulation", "structure.beams.lining",
-    "scipy.optimize", "gmsh", "meshio", "h5netcdf", "pint", "xarray", "dask.array",
+    "scipy.interpolate", "scipy.optimize", "gmsh", "meshio", "h5netcdf", "pint", "xarray", "dask.array",
 )  # fmt: skip
 INTERRUPTED, ALONE = 130, 131
 #: Exit codes after which nobody waits for a worker.
