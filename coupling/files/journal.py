@@ -77,34 +77,28 @@ class Overlay(io.RawIOBase):
         """Read at the position."""
         view = memoryview(buffer).cast("B")
         count = max(0, min(len(view), self.size - self._position))
-        done = 0
-        while done < count:
-            number, start = divmod(self._position + done, PAGE)
+        view[:count] = self._below(self._position, count)
+        for number, inside, part in self._pieces(count):
             if number in self.pages:
-                length = min(PAGE - start, count - done)
-                view[done : done + length] = self.pages[number][start : start + length]
-            else:
-                # as far as the next changed page at once
-                length = PAGE - start
-                while done + length < count and (self._position + done + length) // PAGE not in self.pages:
-                    length += PAGE
-                length = min(length, count - done)
-                view[done : done + length] = self._below(self._position + done, length)
-            done += length
+                view[part] = self.pages[number][inside]
         self._position += count
         return count
 
     def write(self, data):
         """Write at the position, into memory."""
-        view, done = memoryview(data).cast("B"), 0
-        while done < len(view):
-            number, start = divmod(self._position + done, PAGE)
-            length = min(PAGE - start, len(view) - done)
-            self._page(number)[start : start + length] = view[done : done + length]
-            done += length
-        self._position += done
+        view = memoryview(data).cast("B")
+        for number, inside, part in self._pieces(len(view)):
+            self._page(number)[inside] = view[part]
+        self._position += len(view)
         self.size = max(self.size, self._position)
-        return done
+        return len(view)
+
+    def _pieces(self, count):
+        """Pages of so many bytes from the position on: number, what of the page, and what of these bytes it is."""
+        first, last = self._position, self._position + count
+        for number in range(first // PAGE, -(-last // PAGE)):
+            begin, end = max(first, number * PAGE), min(last, (number + 1) * PAGE)
+            yield number, slice(begin - number * PAGE, end - number * PAGE), slice(begin - first, end - first)
 
     def _page(self, number):
         if number not in self.pages:

@@ -82,15 +82,11 @@ def largest_forces(responses: list[xr.Dataset]) -> list[Extreme]:
 
 
 def _extreme(response, name, kind):
-    around = [dim for dim in response[name].dims if dim != "time"]
-    values = response[name].transpose("time", *around).values
-    score = {"max": values, "min": -values, "size": np.abs(values)}[kind]
-    record, *place = np.unravel_index(int(np.nanargmax(score)), values.shape)
-    at = {"time": float(response["time"][record])}
-    if "inflow_mass" in response:
-        at["inflow_mass"] = float(response["inflow_mass"][record])
-    at |= {dim: response[dim].values[k].item() for dim, k in zip(around, place, strict=True)}
-    return float(values[record, *place]), at
+    values = response[name]
+    score = {"max": values, "min": -values, "size": abs(values)}[kind]
+    there = response.isel(score.argmax(values.dims))
+    known = [key for key in ("time", "inflow_mass", "theta", "joint") if key in there and not there[key].dims]
+    return there[name].item(), {key: there[key].item() for key in known}
 
 
 def settled(points: xr.Dataset) -> tuple[xr.DataArray, xr.Dataset] | None:

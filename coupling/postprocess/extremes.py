@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-import numpy as np
 import xarray as xr
 
 from structure.limits import UTILISATIONS
@@ -31,22 +30,16 @@ def extremes(dataset: xr.Dataset, names: Sequence[str] = FORCES, along: str = "t
     for name in names:
         if along not in dataset[name].dims:
             raise ValueError(f"extremes: {name} must have the dimension {along}, got {dataset[name].dims}")
-        about, dims = dataset[name].attrs, [dim for dim in dataset[name].dims if dim != along]
-        values, places = dataset[name].transpose(*dims, along).values, dataset[along].values
-        known = ~np.isnan(values)
-        for kind, pick, sign in (("max", "largest", 1.0), ("min", "smallest", -1.0)):
-            at = np.argmax(np.where(known, sign * values, -np.inf), axis=-1)
+        values, about, angle = dataset[name], dataset[name].attrs, dataset[along].attrs.get("units", "degree")
+        for kind, pick, largest, where in (
+            ("max", "largest", values.max(along), values.idxmax(along)),
+            ("min", "smallest", values.min(along), values.idxmin(along)),
+        ):
             text = f"{pick} {about.get('long_name', name)}"
-            result[f"{name}_{kind}"] = (
-                dims,
-                np.take_along_axis(values, at[..., None], axis=-1)[..., 0],
-                {"units": about.get("units", "1"), "long_name": text},
-            )
-            result[f"{name}_{kind}_angle"] = (
-                dims,
-                np.where(known.any(axis=-1), places[at], np.nan),
-                {"units": dataset[along].attrs.get("units", "degree"), "long_name": f"where the {text} is"},
-            )
+            told = {"units": about.get("units", "1"), "long_name": text}
+            result[f"{name}_{kind}"] = (largest.dims, largest.values, told)
+            told = {"units": angle, "long_name": f"where the {text} is"}
+            result[f"{name}_{kind}_angle"] = (where.dims, where.values, told)
     result = result.assign_coords({name: c for name, c in dataset.coords.items() if along not in c.dims})
     if "inflow_mass" in dataset:
         result["inflow_mass"] = dataset["inflow_mass"]
