@@ -5,9 +5,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from coupling.datasets import RunFileError, opened, read_attributes, read_history
+from coupling.datasets import opened, read_attributes, read_history
 from coupling.files.folder import RUN_FILE, how_to_go_on
-from coupling.files.own_content import require_own_content
 from coupling.refused import Refused, SceneError
 from coupling.studies.folder import STUDY_FILE, case_file
 
@@ -82,24 +81,16 @@ def _file(path):
 
 
 def _netcdf(path):
-    import h5netcdf
-    import h5py
-
-    try:
-        with h5py.File(path, "r") as file, h5netcdf.File(file, "r") as content:
-            require_own_content(file)
-            groups, title = list(content.groups), str(content.attrs.get("title", ""))
-            names = list(content.variables)
-    except Exception as error:
-        raise RunFileError(
-            f"'{path}': cannot be read as netCDF-4 ({type(error).__name__}: {error}); copy it again or repeat the run"
-        ) from error
+    with opened(path) as file:
+        groups, content = file.names(), file.group(None)
     if {"lining", "history"} <= set(groups):
         facts = _run_facts(path)
         return {"kind": "run file", "facts": facts, "next": _run_commands(path, facts)}
+    names = list(content.variables)
     kind = "pressures on a lining" if {"soil_pressure", "water_pressure"} <= set(names) else (
         "response of a lining" if "bending_moment" in names else "netCDF-4 file"
     )  # fmt: skip
+    title = str(content.attrs.get("title", ""))
     return {"kind": kind, "facts": {"title": title, "variables": ", ".join(names), "groups": ", ".join(groups)}}
 
 

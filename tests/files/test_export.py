@@ -303,6 +303,6 @@ def test_info_tells_what_a_file_is(folder, tmp_path):
     assert shown.exit_code == 0 and "inflow mass [kg/m]" in shown.output and "gush report" in shown.output
     assert json.loads(gush("info", folder, "--json", "-").stdout)["kind"] == "run folder"
     (tmp_path / "cut.nc").write_bytes((folder / "run.nc").read_bytes()[:5000])
-    for path, message in ((tmp_path / "none", "no such file"), (tmp_path / "cut.nc", "cannot be read")):
+    for path, message in ((tmp_path / "none", "no such file"), (tmp_path / "cut.nc", "truncated")):
         refused = gush("info", path)
         assert refused.exit_code == 2 and message in refused.output
