@@ -144,7 +144,8 @@ def _in_this_process(plan, missing, folder, threads):
 
 
 def _in_processes(plan, missing, folder, count, threads):
-    from coupling.studies.pool import Pool, WorkerLost
+    from coupling.studies.pool import Pool
+    from coupling.studies.worker import WorkerLost
 
     def run(cases):
         found = {case.key: case for case in cases}
@@ -153,8 +154,7 @@ def _in_processes(plan, missing, folder, count, threads):
             for module in COLLECTING:
                 import_module(module)
             for key, ended in pool.run(run_case, calls):
-                lost = isinstance(ended, WorkerLost)
-                yield found[key], _text(ended) if lost else ended, lost
+                yield found[key], ended, isinstance(ended, WorkerLost)
 
     yield from _outlasting_losses(run, missing)
 

@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -10,15 +9,11 @@ from multiprocessing import Pipe
 from multiprocessing.connection import wait
 from typing import Any
 
-from coupling.studies.worker import Lost
+from coupling.studies.worker import WorkerLost
 
 #: Libraries take all cores for themselves unless they are told that others are at work.
 ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 SECONDS_TO_STOP = 20.0  # a run that is stopped writes a checkpoint
-
-
-class WorkerLost(RuntimeError):
-    """The process that ran a call is gone, and how."""
 
 
 class Pool:
@@ -58,7 +53,7 @@ class Pool:
                 family.kill()
                 family.wait()
 
-    def run(self, function: Callable, calls: dict[Any, tuple]) -> Iterator[tuple[Any, str | WorkerLost]]:
+    def run(self, function: Callable, calls: dict[Any, tuple]) -> Iterator[tuple[Any, str]]:
         """Run `function` with the arguments of every call; yields a key and how it ended, in the order of the ends.
 
         The end is the text of what the function raised, empty for none, or a :class:`WorkerLost`; a lost worker is
@@ -84,15 +79,6 @@ class Pool:
             # all of its family
             connection.close()
             self._start(1)
-            return WorkerLost("its process is gone")
+            return WorkerLost("WorkerLost: its process is gone")
         self._idle.append(connection)
-        return _meant(told)
-
-
-def _meant(told):
-    if not isinstance(told, Lost):
         return told
-    if told > 0:
-        return WorkerLost(f"its process ended with code {told}")
-    name = signal.Signals(-told).name
-    return WorkerLost(f"its process was killed ({name}{'; is there enough memory?' if name == 'SIGKILL' else ''})")

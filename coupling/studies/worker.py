@@ -22,8 +22,8 @@ INTERRUPTED, ALONE = 130, 131
 ENDINGS = (0, INTERRUPTED, ALONE)
 
 
-class Lost(int):
-    """How a worker ended in the middle of a call: its exit code, the number of a signal below zero."""
+class WorkerLost(str):
+    """How the process that ran a call ended in the middle of it."""
 
 
 def serve(descriptors):
@@ -36,11 +36,18 @@ def serve(descriptors):
     while workers:
         pid, status = os.wait()
         descriptor, code = workers.pop(pid), os.waitstatus_to_exitcode(status)
-        if code not in ENDINGS and _told(descriptor, Lost(code)):
+        if code not in ENDINGS and _told(descriptor, WorkerLost(f"WorkerLost: its process {_ending(code)}")):
             workers[_forked(descriptor, descriptors)] = descriptor
         else:
             os.close(descriptor)
             descriptors.remove(descriptor)
+
+
+def _ending(code):
+    if code > 0:
+        return f"ended with code {code}"
+    name = signal.Signals(-code).name
+    return f"was killed ({name}{'; is there enough memory?' if name == 'SIGKILL' else ''})"
 
 
 def _told(descriptor, message):
