@@ -63,14 +63,10 @@ def init_command(
 
 def _values(scene):
     """Values of the base by the keys that are asked for, where it has them."""
-    from coupling.scenes.mistake_lines import entry_at
+    from coupling.scenes.layers import entry_at
 
-    found, nested = {}, scene.nested()
-    for name in QUESTIONS:
-        value = entry_at(nested, [int(part) if part.isdecimal() else part for part in name.split(".")])
-        if value is not None:
-            found[name] = value
-    return found
+    found = {name: entry_at(scene.nested(), name.split(".")) for name in QUESTIONS}
+    return {name: value for name, value in found.items() if value is not None}
 
 
 def _ask(name, value):

@@ -2,6 +2,7 @@
 
 import difflib
 import tomllib
+from collections.abc import Iterable
 from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -94,6 +95,20 @@ def nested(name: str, value: Any) -> dict[str, Any]:
     for part in reversed(name.split(".")):
         value = {part: value}
     return value
+
+
+def entry_at(data: Any, path: Iterable[str | int], otherwise: Any = None) -> Any:
+    """The entry at a path of nested tables and lists, whose entries go by their numbers; `otherwise` without one.
+
+    >>> entry_at({"soils": [{"k0": 0.5}]}, "soils.0.k0".split("."))
+    0.5
+    """
+    for part in path:
+        try:
+            data = data[str(part)] if isinstance(data, dict) else data[int(part)]
+        except (KeyError, IndexError, TypeError, ValueError):
+            return otherwise
+    return data
 
 
 def change_layers(changes: dict[str, Any]) -> list[Layer]:

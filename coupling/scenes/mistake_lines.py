@@ -9,11 +9,12 @@ from bisect import bisect_left
 from functools import cache
 from typing import Any
 
-from coupling.scenes.layers import Layer
+from coupling.scenes.layers import Layer, entry_at
 from coupling.scenes.plausibility import shown
 
 # an error message is not worth more; a longer search gives no line
 MOST_PARSES = 300
+_ABSENT = object()
 
 
 def mistake_line(
@@ -82,15 +83,7 @@ def line_of(text: str, path: tuple[Any, ...]) -> int | None:
 
 def holds(data, path):
     """Whether nested dictionaries and lists have an entry at `path`; a table may name entries of a list by number."""
-    for part in path:
-        if isinstance(data, dict):
-            part = str(part)
-            if part not in data:
-                return False
-        elif not (isinstance(data, list) and isinstance(part, int) and part < len(data)):
-            return False
-        data = data[part]
-    return True
+    return entry_at(data, path, _ABSENT) is not _ABSENT
 
 
 def path_of(message, location, data):
@@ -118,16 +111,6 @@ def path_of(message, location, data):
         key = next((word for word in re.findall(r"\w+", message) if word in table), None)
         path = (*path, key) if key is not None else path
     return path
-
-
-def entry_at(data, path):
-    """The entry at `path` of nested dictionaries and lists; None where there is none."""
-    for part in path:
-        try:
-            data = data[part]
-        except (KeyError, IndexError, TypeError):
-            return None
-    return data
 
 
 class _TooLong(Exception):

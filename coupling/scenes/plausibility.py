@@ -6,6 +6,7 @@ import math
 import warnings
 from typing import TYPE_CHECKING, Any
 
+from coupling.scenes.layers import entry_at
 from coupling.scenes.rings import gate_tunnel
 from structure.inputs import GushingWarning
 from structure.plausibility import (
@@ -127,9 +128,7 @@ def hints(data: dict[str, Any]) -> dict[tuple[Any, ...], str]:
     """
     found = {}
     for name, usual in USUAL.items():
-        table = data
-        for part in name.split("."):
-            table = table.get(part) if isinstance(table, dict) else None
+        table = entry_at(data, name.split("."))
         tables = enumerate(table) if isinstance(table, list | tuple) else [(None, table)]
         for index, entry in tables:
             path = (*name.split("."), *(() if index is None else (index,)))
@@ -176,7 +175,4 @@ def _follows(path, data):
     if path[0] != "ring":
         return False
     others = data.get("tunnels", ()) if path[1] != "ground" else data.get("soils", ())
-    value = data
-    for part in path:
-        value = value[part]
-    return any(entry.get(path[-1]) == value for entry in others)
+    return any(entry.get(path[-1]) == entry_at(data, path) for entry in others)

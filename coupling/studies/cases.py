@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from coupling.refused import Refused, SceneError
-from coupling.scenes.layers import changed, nested, read_scene_data
+from coupling.scenes.layers import changed, entry_at, nested, read_scene_data
 from coupling.scenes.scene import Scene, make_scene
 from coupling.studies.design import AS_IT_IS, Study, StudyError, short_names, value_text
 
@@ -95,12 +95,7 @@ def _value_in(scene, name):
     for soil, table in zip(scene.soils, value["soils"], strict=True):
         lowest, highest = scene.lateral_pressure_range(soil)
         table["k0"] = highest if lowest == highest else None
-    for part in name.split("."):
-        try:
-            value = value[int(part)] if isinstance(value, list | tuple) else value[part]
-        except (KeyError, TypeError, ValueError, IndexError):
-            return None
-    return value
+    return entry_at(value, name.split("."))
 
 
 @cache
