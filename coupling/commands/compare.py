@@ -60,18 +60,6 @@ def store(comparison, source, out=None):
     }
 
 
-def store_runs(compared, folder):
-    """Write the states of runs side by side and the page about them; returns a dict of paths."""
-    from coupling.datasets import write_dataset
-    from coupling.report.page import write_runs_report
-    from coupling.studies.side_by_side import TITLE
-
-    data, page = folder / STATES, folder / REPORT_FILE
-    claim(folder, (data, page), STATES, TITLE)
-    write_dataset(data, compared.dataset())
-    return {"data": str(data), "report": str(write_runs_report(compared, page))}
-
-
 def compare_command(
     runs: Annotated[
         list[Path],
@@ -130,10 +118,15 @@ def compare_command(
 
 
 def _compare_runs(runs, along, out):
-    from coupling.studies.side_by_side import side_by_side
+    from coupling.datasets import write_dataset
+    from coupling.report.page import write_runs_report
+    from coupling.studies.side_by_side import TITLE, side_by_side
 
     compared = side_by_side(runs, along)
-    states = compared.states[0]
+    states, folder = compared.states[0], Path("runs") / "compared" if out is None else out
+    data, page = folder / STATES, folder / REPORT_FILE
+    claim(folder, (data, page), STATES, TITLE)
+    write_dataset(data, compared.dataset())
     return {
         "runs": [str(run) for run in runs],
         "names": [case.parameters["run"] for case in compared.cases],
@@ -141,7 +134,8 @@ def _compare_runs(runs, along, out):
         "to": float(states[along][-1]),
         "model": str(states["model"].values[0]) if "model" in states.dims else None,
         "rows": compared.rows,
-        **store_runs(compared, Path("runs") / "compared" if out is None else out),
+        "data": str(data),
+        "report": str(write_runs_report(compared, page)),
     }
 
 

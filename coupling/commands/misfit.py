@@ -62,24 +62,13 @@ def misfit_command(
 def _data(found):
     """What a dataset of :func:`coupling.measurements.misfit` says, as JSON takes it."""
     attributes = {name: found.attrs[name] for name in ("count", "not_reached", "chi_square", "probability")}
-    sums = ("count", "chi_square", "mean_residual", "probability")
-    quantities = [
-        {"name": name, **{key: found[key].values[k].item() for key in sums}}
-        for k, name in enumerate(found["quantity"].values.tolist())
-    ]
-    columns = ("line", "sensor", "tunnel", "place", "time", "inflow_mass", "change", "unit", "measured", "error",
-               "common_error", "computed", "residual")  # fmt: skip
-    rows = [
-        {"quantity": name, **{key: _known(found[key].values[k].item()) for key in columns}}
-        for k, name in enumerate(found["name"].values.tolist())
-    ]
-    for row in rows:
-        row["tunnel"] = None if row["tunnel"] < 0 else row["tunnel"]
-    return {**attributes, "quantities": quantities, "rows": rows}
-
-
-def _known(value):
-    return None if value != value else value
+    sums = found[["count", "chi_square", "mean_residual", "probability"]].to_dataframe().reset_index(names="name")
+    columns = ["quantity", "line", "sensor", "tunnel", "place", "time", "inflow_mass", "change", "unit", "measured",
+               "error", "common_error", "computed", "residual"]  # fmt: skip
+    rows = found.drop_dims("quantity").to_dataframe().rename(columns={"name": "quantity"})[columns].astype(object)
+    rows["tunnel"] = rows["tunnel"].where(rows["tunnel"] >= 0)
+    rows = rows.where(rows.notna(), None)
+    return {**attributes, "quantities": sums.to_dict("records"), "rows": rows.to_dict("records")}
 
 
 def _quantity_table(data):

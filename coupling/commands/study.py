@@ -35,13 +35,15 @@ def study_command(
     JSON: keys of `coupling.studies.stored.run_study`.
     """
     with answering(json_path) as answer:
+        from coupling.studies.limits import HEADS, limit_rows
         from coupling.studies.stored import run_study
 
         data = run_study(study, out, workers, scheduler, Console(stderr=True))
         if answer(data):
             Console().print(_study_table(data))
             if data["limits"]:
-                Console().print(_limits_table(data))
+                names = {case["case"]: case["name"] for case in data["cases"]}
+                Console().print(table(HEADS, limit_rows(data["limits"], names)))
             say(f"data: {data['data']}")
         if any(case["status"] == "failed" for case in data["cases"]):
             raise typer.Exit(FAILED)
@@ -65,9 +67,3 @@ def _study_table(data):
             cells += [f"{case['cpu_seconds']:.1f}"]
         made.add_row(case["name"], *cells, case["message"] or case["status"])
     return made
-
-
-def _limits_table(data):
-    from coupling.studies.limits import HEADS, limit_rows
-
-    return table(HEADS, limit_rows(data["limits"], {case["case"]: case["name"] for case in data["cases"]}))
