@@ -8,7 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 from coupling.files.replace import replace_file
 from coupling.studies.folder import CASE_FILE, PROGRESS_FILE
@@ -98,35 +99,26 @@ def watching(folder, numbers, failures, watch: Callable[[StudyState], None] | No
         watch(study_state(folder, numbers, dict(failures)))
 
 
-class StudyLine:
+class StudyLine(Progress):
     """The live lines of a study on a console of rich, if it is a terminal: the whole, and every case at work."""
 
-    def __init__(self, console):
+    def __init__(self, console: Console):
         columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
-        self._bars = Progress(*columns, TimeRemainingColumn(), console=console, transient=True)
-        self._shown: dict[int, object] = {}
-        self._whole = self._bars.add_task("study", total=1.0)
-        self._live = console.is_terminal
-
-    def __enter__(self):
-        if self._live:
-            self._bars.start()
-        return self
-
-    def __exit__(self, *_):
-        if self._live:
-            self._bars.stop()
+        disable = not console.is_terminal
+        super().__init__(*columns, TimeRemainingColumn(), console=console, transient=True, disable=disable)
+        self._shown: dict[int, TaskID] = {}
+        self._whole = self.add_task("study", total=1.0)
 
     def __call__(self, state):
         """Show one :class:`StudyState`."""
         text = f"{state.done} of {state.total} cases" + (f", {state.failed} failed" if state.failed else "")
-        self._bars.update(self._whole, completed=state.share, description=text)
+        self.update(self._whole, completed=state.share, description=text)
         for number in set(self._shown) - set(state.running):
-            self._bars.remove_task(self._shown.pop(number))
+            self.remove_task(self._shown.pop(number))
         for number, case in state.running.items():
             if number not in self._shown:
-                self._shown[number] = self._bars.add_task("", total=1.0)
+                self._shown[number] = self.add_task("", total=1.0)
             what = f"{case['inflow_mass']:.0f} kg/m" if case.get("stage") == "gush" else case.get("stage", "")
-            self._bars.update(
+            self.update(
                 self._shown[number], completed=min(case.get("share", 0.0), 1.0), description=f"  case {number}: {what}"
             )
