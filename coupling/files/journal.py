@@ -57,10 +57,6 @@ class Overlay(io.RawIOBase):
         self._position = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._position, os.SEEK_END: self.size}[whence]
         return self._position
 
-    def tell(self):
-        """Position [bytes]."""
-        return self._position
-
     def truncate(self, size=None):
         """Set the size; what lies beyond is zero when the file grows again."""
         size = self._position if size is None else size
