@@ -1,10 +1,11 @@
-"""What is wrong with a run file that cannot be used, in words."""
+"""What is wrong with a run file that cannot be used, in words; content of other files is refused before it is read."""
 
 import contextlib
 import os
 from pathlib import Path
 
-from coupling.files.own_content import ForeignContent
+import h5py
+
 from coupling.refused import RunFileError
 
 
@@ -36,8 +37,6 @@ def _why_unreadable(file, group, error):
         return f"run file '{file}': cannot be read: {reason.strerror}; check its permissions"
     if signature != b"\x89HDF\r\n\x1a\n":
         return f"run file '{file}': not a netCDF-4 file ({size} bytes); give the run.nc that `gush run` wrote"
-    if isinstance(error, ForeignContent):
-        return f"run file '{file}': must hold its own content, {error}; give the file that `gush run` wrote"
     if "truncated" in str(error) or "eof" in str(error).lower():
         return (
             f"run file '{file}': truncated, its end is missing ({size} bytes are left); copy it again or repeat the run"
@@ -47,3 +46,28 @@ def _why_unreadable(file, group, error):
             "run `gush respond` first" if group.startswith("structure") else "it is not a run file, or it is damaged"
         )
     return f"run file '{file}': damaged ({type(error).__name__}: {said}); copy it again or repeat the run"
+
+
+def require_own_content(file, group):
+    """Refuse external links, external storage and virtual datasets; a damaged file raises what the library raises.
+
+    file : path, for the message;  group : h5py.File or h5py.Group, open; nothing of it has been read yet.
+
+    Raises RunFileError; OSError, KeyError, RuntimeError, ValueError: from the library.
+    """
+    for name in group:
+        link = group.get(name, getlink=True)
+        entry = group[name] if isinstance(link, h5py.HardLink) else None
+        foreign = ""
+        if isinstance(link, h5py.ExternalLink):
+            foreign = f"'{group.name}/{name}' is a link into the file '{link.filename}'"
+        elif isinstance(link, h5py.SoftLink):
+            foreign = f"'{group.name}/{name}' is a link to '{link.path}'"  # nothing here writes one
+        elif isinstance(entry, h5py.Group):
+            require_own_content(file, entry)
+        elif isinstance(entry, h5py.Dataset) and (entry.external or entry.is_virtual):
+            foreign = f"'{entry.name}' has its values in other files"
+        if foreign:
+            raise RunFileError(
+                f"run file '{file}': must hold its own content, {foreign}; give the file that `gush run` wrote"
+            )

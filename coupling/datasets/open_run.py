@@ -11,12 +11,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from coupling.datasets.damage import damage_told
+from coupling.datasets.damage import damage_told, require_own_content
 from coupling.datasets.group import read_group_at_once
 from coupling.datasets.schema import AXES, INFLOW
 from coupling.files.folder import RUN_FILE, how_to_go_on, in_use
 from coupling.files.journal import readable
-from coupling.files.own_content import require_own_content
 from coupling.refused import RunFileError
 
 
@@ -122,7 +121,7 @@ def opened(run: Run) -> Iterator[OpenRun]:
             if not isinstance(shown, Path):
                 closing.enter_context(shown)
             content = closing.enter_context(h5py.File(shown, "r"))
-            require_own_content(content)
+            require_own_content(file, content)
         yield OpenRun(file, content)
 
 
