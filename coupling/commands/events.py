@@ -7,7 +7,7 @@ import sys
 import time as clock
 from datetime import UTC, datetime
 
-from coupling.commands.exit_codes import INTERRUPTED, exit_code, finite
+from coupling.commands.exit_codes import INTERRUPTED, check_json, exit_code, finite
 
 
 class EventStream:
@@ -26,6 +26,7 @@ class EventStream:
         self._path, self._out = path, None
 
     def __enter__(self):
+        check_json(self._path)
         if self.printing:
             self._out = sys.stdout
         elif self._path is not None:

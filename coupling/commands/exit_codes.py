@@ -20,21 +20,6 @@ DIFFERENT, REFUSED, FAILED, INTERRUPTED = 1, 2, 3, 130
 JsonPath = Annotated[Path | None, typer.Option("--json", help="Also write the result as JSON; - prints it.")]
 
 
-@contextlib.contextmanager
-def failures():
-    """Turn what a user can cause into one message and an exit code."""
-    try:
-        yield
-    except KeyboardInterrupt as interrupt:
-        by = f" by {interrupt}" if str(interrupt) else ""
-        complain("\n".join([f"interrupted{by}", *getattr(interrupt, "__notes__", ())]), INTERRUPTED)
-    except (ValueError, RuntimeError, MemoryError, OSError) as error:
-        code = exit_code(error)
-        if code is None:
-            raise
-        complain("\n".join([str(error) or "not enough memory", *getattr(error, "__notes__", ())]), code)
-
-
 def exit_code(error):
     """2 for refused input, 3 for a failed run, None for what is a mistake of the program."""
     from mpm.mesh import MeshError
@@ -61,21 +46,30 @@ def answering(json_path):
         write_json(json_path, data)
         return str(json_path) != "-"
 
-    with failures(), checked_json(json_path), told_warnings():
-        yield answer
+    try:
+        check_json(json_path)
+        with told_warnings():
+            yield answer
+    except KeyboardInterrupt as interrupt:
+        by = f" by {interrupt}" if str(interrupt) else ""
+        complain("\n".join([f"interrupted{by}", *getattr(interrupt, "__notes__", ())]), INTERRUPTED)
+    except (ValueError, RuntimeError, MemoryError, OSError) as error:
+        code = exit_code(error)
+        if code is None:
+            raise
+        complain("\n".join([str(error) or "not enough memory", *getattr(error, "__notes__", ())]), code)
 
 
-@contextlib.contextmanager
-def checked_json(path):
+def check_json(path):
     """Refuse a --json path before the work instead of after it."""
-    if path is not None and str(path) != "-":
-        if path.is_dir() or not path.absolute().parent.is_dir():
-            raise Refused(f"--json '{path}': must be a file in an existing folder; choose another path")
-        if path.exists():
-            with path.open("rb") as file:
-                if file.read(1) not in (b"{", b""):
-                    raise Refused(f"--json '{path}': exists and is not JSON; choose another path")
-    yield
+    if path is None or str(path) == "-":
+        return
+    if path.is_dir() or not path.absolute().parent.is_dir():
+        raise Refused(f"--json '{path}': must be a file in an existing folder; choose another path")
+    if path.exists():
+        with path.open("rb") as file:
+            if file.read(1) not in (b"{", b""):
+                raise Refused(f"--json '{path}': exists and is not JSON; choose another path")
 
 
 def write_json(path, data):

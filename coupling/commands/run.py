@@ -8,7 +8,7 @@ import typer
 from rich.console import Console
 
 from coupling.commands.events import EventStream
-from coupling.commands.exit_codes import JsonPath, answering, checked_json, say, warn
+from coupling.commands.exit_codes import JsonPath, answering, say, warn
 from coupling.commands.options import Changes, Quiet, Threads, completed
 from coupling.commands.tables import limits_table, response_table, table
 from coupling.runs.progress_line import ProgressLine
@@ -46,7 +46,7 @@ def run_command(
     (keys of `coupling.postprocess.summary.summarise_response`, or null). Events:
     see `coupling.commands.events.EventStream`.
     """
-    with answering(json_path) as answer, checked_json(events), EventStream(events) as stream:
+    with answering(json_path) as answer, EventStream(events) as stream:
         from coupling.datasets import RunFileError, opened, read_response
         from coupling.files.folder import FIGURES
         from coupling.postprocess.quality import quality_line, states_line, verdicts
