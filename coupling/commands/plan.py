@@ -35,12 +35,10 @@ def plan_command(
 
         data = {**(rough_plan if rough else plan)(loaded, threads, tell), "warnings": told}
         if answer(data):
-            Console().print(_feature_table(data), _cost_table(data), sep="\n")
-
-
-def _feature_table(data):
-    rows = ((row["feature"], "active" if row["active"] else "left out", row["reason"]) for row in data["features"])
-    return table(("part", "", "why"), rows, f"{data['scene']}: what is computed")
+            parts = ((row["feature"], "active" if row["active"] else "left out", row["reason"])
+                     for row in data["features"])  # fmt: skip
+            computed = table(("part", "", "why"), parts, f"{data['scene']}: what is computed")
+            Console().print(computed, _cost_table(data), sep="\n")
 
 
 def _cost_table(data):

@@ -4,11 +4,10 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from coupling.commands.exit_codes import JsonPath, answering, say
 from coupling.commands.options import SOURCE, RingScene
-from coupling.commands.tables import limits_table, response_table
+from coupling.commands.tables import print_ring
 
 
 def draw_checks(checked, file, model, own_file=None, tunnel=None):
@@ -77,8 +76,7 @@ def respond_command(
             data["tunnels"] = {source.tunnel: found for source, found in zip(sources[1:], answers[1:], strict=True)}
         if answer(data):
             for source, found in zip(sources, answers, strict=True):
-                Console().print(response_table(found, source.tunnel))
+                print_ring(found, source.tunnel)
                 if found["utilisations"]:
-                    Console().print(limits_table(found["utilisations"], source.tunnel))
                     say(f"picture in {found['figure']}")
                 say(f"response in {found['file']}")

@@ -10,7 +10,7 @@ from rich.console import Console
 from coupling.commands.events import EventStream
 from coupling.commands.exit_codes import JsonPath, answering, say, warn
 from coupling.commands.options import Changes, Quiet, Threads, completed
-from coupling.commands.tables import limits_table, response_table, table
+from coupling.commands.tables import print_ring, table
 from coupling.runs.progress_line import ProgressLine
 
 
@@ -81,9 +81,7 @@ def run_command(
             Console().print(_run_table(data))
             for tunnel, one in {None: data, **data["tunnels"]}.items():
                 if one["response"]:
-                    Console().print(response_table(one["response"], tunnel))
-                    if one["response"]["utilisations"]:
-                        Console().print(limits_table(one["response"]["utilisations"], tunnel))
+                    print_ring(one["response"], tunnel)
             say(f"errors: {quality_line(data['quality'])}")
             say(f"states of the points, no errors: {states_line(data['quality'])}")
             say(f"results in {folder}")

@@ -1,5 +1,6 @@
 """Tables of the terminal: from rows, and those that several commands show."""
 
+from rich.console import Console
 from rich.table import Table
 
 from structure.response import FORCES, SHOWN
@@ -32,8 +33,11 @@ def response_table(data, tunnel=None):
     return table(("ring" if tunnel is None else f"ring of tunnel {tunnel}", "initial", "final"), rows)
 
 
-def limits_table(found, tunnel=None):
-    """Utilisations of limits with where they pass 1; `found` as of :func:`structure.utilisations`."""
+def print_ring(data, tunnel=None):
+    """The same, and utilisations of limits with where they pass 1, where there are any."""
     from coupling.postprocess.limits import HEADS, limit_rows
 
-    return table(HEADS, limit_rows(found), None if tunnel is None else f"limits of the ring of tunnel {tunnel}")
+    Console().print(response_table(data, tunnel))
+    if data["utilisations"]:
+        title = None if tunnel is None else f"limits of the ring of tunnel {tunnel}"
+        Console().print(table(HEADS, limit_rows(data["utilisations"]), title))

@@ -7,7 +7,7 @@ import xarray as xr
 from coupling.datasets import opened, read_attributes, read_history, read_pressures
 from coupling.datasets.geometry import on_tunnel, tunnels_beside
 from coupling.datasets.open_run import Run
-from coupling.postprocess.extremes import extremes
+from coupling.postprocess.extremes import JOINTS, extremes
 from coupling.postprocess.quality import lining_equilibrium, quality, verdicts
 from mpm.fields import CLAMPS
 from structure.passing import utilisations
@@ -91,17 +91,14 @@ def summarise_response(response: xr.Dataset) -> dict[str, Any]:
         every joint; equilibrium_residual [-]: the largest, None of a lining that moved in the ground; utilisations: as
         of :func:`structure.utilisations`, empty without limits.
     """
-    data = {}
     states = {"initial": response.isel(time=0), "final": response.isel(time=-1)}
-    for name in FORCES:
-        data[name] = {}
-        for state, record in states.items():
-            found = extremes(record, [name])
-            data[name][state] = {
-                key: found[f"{name}_{key.replace('theta', 'angle')}"].item()
-                for key in ("max", "max_theta", "min", "min_theta")
-            }
-    for name in ("joint_opening", "joint_dislocation", "joint_rotation"):
+    found = {state: extremes(record) for state, record in states.items()}
+    keys = {"max": "max", "max_theta": "max_angle", "min": "min", "min_theta": "min_angle"}
+    data = {
+        name: {state: {key: one[f"{name}_{end}"].item() for key, end in keys.items()} for state, one in found.items()}
+        for name in FORCES
+    }
+    for name in JOINTS:
         data[name] = {state: record[name].values.tolist() for state, record in states.items()}
     data["equilibrium_residual"] = lining_equilibrium(response)
     data["utilisations"] = utilisations(response)
