@@ -45,7 +45,8 @@ class Answer(NamedTuple):
     """What a ring comes to by its leading lining model.
 
     model : its name;  others : of other models that are compared;  limits : of :func:`structure.utilisations`;
-    governing : the name in it with the largest utilisation, None without limits;  forces : list of Extreme.
+    governing : the name in it with the largest utilisation, None without limits;  forces : list of Extreme;
+    moved : whether it has moved in the ground, whose response has the attribute `answered`.
     """
 
     model: str
@@ -53,6 +54,7 @@ class Answer(NamedTuple):
     limits: dict[str, dict[str, Any]]
     governing: str | None
     forces: list[Extreme]
+    moved: bool = False
 
 
 def answers(tree: xr.DataTree) -> dict[int | None, Answer]:
@@ -64,7 +66,8 @@ def answers(tree: xr.DataTree) -> dict[int | None, Answer]:
             (model, *others), responses = answered, list(answered.values())
             limits = utilisations(responses[0])
             governing = max(limits, key=lambda name: limits[name]["largest"], default=None)
-            found[tunnel] = Answer(model, others, limits, governing, largest_forces(responses))
+            moved = "answered" in responses[0].attrs
+            found[tunnel] = Answer(model, others, limits, governing, largest_forces(responses), moved)
     return found
 
 

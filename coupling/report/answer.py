@@ -82,12 +82,21 @@ def _row(extreme, ladder):
 
 def _bases(answer, ladder):
     """What the two columns of errors are, or that they are not known."""
-    models = (
-        f"Models: the same extreme of {', '.join(answer.others)} less that of {answer.model}; it shows how much the "
-        "lining model decides, and is no error of either."
-        if answer.others else
-        f"Models: not known, only {answer.model} has answered; `gush respond RUN --backend continuum` adds the other."
-    )  # fmt: skip
+    if answer.others:
+        models = (
+            f"Models: the same extreme of {', '.join(answer.others)} less that of {answer.model}; it shows how much "
+            "the lining model decides, and is no error of either."
+        )
+    elif answer.moved:
+        models = (
+            f"Models: not known; the ring has moved in the ground as {answer.model}. Run the scene with another "
+            "lining_model, then `gush compare RUN OTHER`."
+        )
+    else:
+        models = (
+            f"Models: not known, only {answer.model} has answered; `gush respond RUN --backend continuum` adds the"
+            " other."
+        )
     if ladder is None:
         return [models, "Mesh: not known of this run; `gush accuracy --scene SCENE` makes a ladder of meshes, "
                 "`gush report RUN --ladder SCENE-ladder.nc` puts it here."]  # fmt: skip

@@ -28,7 +28,8 @@ def as_it_moved(ring: Ring, pressures: xr.Dataset, model: str) -> xr.Dataset:
     -------
     xarray.Dataset
         The variables of :data:`structure.response.RESPONSE` but residuals, sums and reactions, at the end of every
-        interval. Displacements are those of the outer face since the ground was undisturbed.
+        interval, with the attribute `answered`. Displacements are those of the outer face since the ground was
+        undisturbed.
 
     Raises
     ------
@@ -49,8 +50,8 @@ def as_it_moved(ring: Ring, pressures: xr.Dataset, model: str) -> xr.Dataset:
         "convergence_vertical": -(crown + invert),
         "settlement": -(outward * np.cos(theta) - along * np.sin(theta)).mean(axis=1),
     }
-    comment = "forces and movements that the lining had in the ground"
-    response = response_dataset(ring, check_pressures(pressures, ring), fields, model, {"comment": comment})
+    answered = {"answered": "in the ground, as it moved there"}
+    response = response_dataset(ring, check_pressures(pressures, ring), fields, model, answered)
     for name in MOVEMENTS:
         response[name].attrs["long_name"] = pressures[name].attrs["long_name"]
     return response
