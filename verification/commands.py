@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
+from rich.markdown import Markdown
 
 from coupling.commands.exit_codes import FAILED, JsonPath, answering, complain, say
 from coupling.commands.options import Scheduler, Workers
@@ -66,19 +67,15 @@ def bench_command(
         raise typer.BadParameter("--step measures too little for a page; leave out --step or --out")
     with answering(json_path) as answer:
         from coupling.scenes.scene import load_scene
+        from verification.pages import rendered, templated_page
         from verification.speed.command import bench
-        from verification.speed.report import bench_page, facts, write
+        from verification.speed.report import write
 
-        page = None if out is None else bench_page(out)
+        page = None if out is None else templated_page(out, "performance")
         data = bench(load_scene(scene), step, large, Console(stderr=True).print)
         data["files"] = write(data, page) if page is not None else []
         if answer(data):
-            rows = list(facts(data))
-            for row in (*data.get("configurations", ()), *data.get("sizes", ())):
-                what = row.get("configuration", f"{row.get('points')} points in a box")
-                rows.append((f"{what}, million point-steps a CPU s", f"{row['points_per_second'] / 1e6:.2f}"))
-            rows += [(f"kernel {name}, ns a point-step", f"{1e9 * s:.1f}") for name, s in data["kernels"].items()]
-            Console().print(table(("measured", ""), rows))
+            _show(rendered("performance", **data))
             _say_all(data["files"])
 
 
@@ -93,13 +90,13 @@ def stability_command(
     JSON: keys of `verification.stability.report.stability`. Exit code 3 when one of its `faults` is found.
     """
     with answering(json_path) as answer:
-        from verification.stability.report import shown_tables, stability
+        from verification.pages import rendered
+        from verification.stability.report import stability
 
         with ProgressLine() as line:
             data = stability(case or [], linear, out, Console(stderr=True).print, line.say)
         if answer(data):
-            for each in shown_tables(data):
-                Console().print(each)
+            _show(rendered("stability", **data))
             _say_all(data["files"])
     if data["faults"]:
         complain("\n".join(data["faults"]), FAILED)
@@ -154,6 +151,12 @@ def figures_command(
         figures = {number: str(path) for number, path in draw_study(study, out or study / "figures").items()}
         if answer({"figures": figures}):
             _say_all(f"figure {number}: {path}" for number, path in figures.items())
+
+
+def _show(blocks):
+    """Blocks of a page, in the terminal."""
+    for text in blocks.values():
+        Console().print(Markdown(text))
 
 
 def _say_all(lines):

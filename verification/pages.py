@@ -1,4 +1,7 @@
-"""Report pages: Markdown written by hand, in which commands replace the blocks between two comments that name them."""
+"""Report pages: Markdown written by hand, in which commands replace the blocks between two comments that name them.
+
+What a block shows of the numbers that were measured is a jinja2 template in `templates/`, a page of blocks alone.
+"""
 
 import json
 import os
@@ -9,11 +12,18 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
+import jinja2
+
 from coupling.files.provenance import revision
 from coupling.refused import Refused
 
 #: Docs of the working copy this code runs from; an installed program has none.
 DOCS = Path(__file__).resolve().parent.parent / "docs"
+#: Text of a block by its name.
+MARKED = re.compile("<!-- (?P<name>.+) -->\n(?P<text>.*?)<!-- end of (?P=name) -->", re.S)
+TEMPLATES = jinja2.Environment(
+    loader=jinja2.PackageLoader("verification"), trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+)
 
 
 class Page:
@@ -56,6 +66,19 @@ def _begin(name):
 
 def _end(name):
     return f"<!-- end of {name} -->"
+
+
+def rendered(template, **numbers):
+    """Blocks of a template filled with numbers, name to text; those that the template leaves out are not there."""
+    text = TEMPLATES.get_template(f"{template}.md").render(numbers)
+    return {found["name"]: found["text"] for found in MARKED.finditer(text)}
+
+
+def templated_page(folder, template):
+    """The page of a template in a folder, with the block "made" and all of the template."""
+    source = TEMPLATES.loader.get_source(TEMPLATES, f"{template}.md")[0]
+    title = source.partition("\n")[0].removeprefix("# ")
+    return Page(Path(folder) / f"{template}.md", title, ["made", *(found["name"] for found in MARKED.finditer(source))])
 
 
 def docs_page(name, *blocks):

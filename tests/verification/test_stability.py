@@ -10,7 +10,7 @@ import pytest
 from mpm.fields import block
 from mpm.solver import Solver
 from verification.monitor import Monitor, follow
-from verification.pages import Page
+from verification.pages import templated_page
 from verification.stability.amplification import STABLE as NO_GROWTH
 from verification.stability.amplification import Amplification, Column
 from verification.stability.cases import Case, cases
@@ -109,8 +109,8 @@ def test_extreme_is_stable(name):
 def test_page_and_data_hold_the_map_and_the_extremes(tmp_path):
     found = critical_map([("dry", Column(bulk_modulus=None)), ("wet", Column())])
     verdict = judge(Case("still", "nothing happens", lambda: (["moves"], {})))
-    data = {"linear": families(found), "extremes": [asdict(verdict)]}
-    page = Page(tmp_path / "stability.md", "Stability", ("made", "map", "extremes"))
+    data = {"linear": families(found), "reading": {}, "extremes": [asdict(verdict)]}
+    page = templated_page(tmp_path, "stability")
     files = write(page, data, None)
     text = (tmp_path / "stability.md").read_text()
     assert "| still | nothing happens | bug |" in text and "1 bug" in text and "moves" in text

@@ -15,8 +15,7 @@ import sys
 import tempfile
 import time as clock
 
-from verification.pages import DOCS, docs_page, provenance, write_data
-from verification.speed.report import study_block
+from verification.pages import DOCS, docs_page, provenance, rendered, write_data
 
 ANGLES = [15.0, 30.0, 45.0, 60.0, 75.0, 90.0]
 #: About two seconds of processor time a case, half of it for files and the ring.
@@ -102,7 +101,7 @@ def main():
     page = None if chosen.print_only else docs_page("performance", "study")
     data = study_seconds(chosen.rounds, lambda line: print(line, file=sys.stderr, flush=True))
     if page is not None:
-        page.fill({"study": study_block(data)})
+        page.fill(rendered("performance", study=data))
         numbers = DOCS / "performance.json"
         write_data(numbers, json.loads(numbers.read_text(encoding="utf-8")) | {"study": data})
     print(json.dumps(data, indent=1))
