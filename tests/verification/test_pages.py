@@ -7,11 +7,6 @@ import pytest
 
 from verification.pages import DOCS, Page, docs_page, rendered
 from verification.reports import left_out, lining_in_mpm
-from verification.robustness import page as robustness
-
-
-def of_robustness(parts):
-    return {name: robustness.block(name, part) for name, part in parts.items()}
 
 
 def of_template(name):
@@ -20,7 +15,7 @@ def of_template(name):
 
 PAGES = {
     "left-out": left_out.blocks, "lining-in-mpm": lining_in_mpm.blocks, "performance": of_template("performance"),
-    "robustness": of_robustness, "stability": of_template("stability"),
+    "robustness": of_template("robustness"), "stability": of_template("stability"),
 }  # fmt: skip
 
 

@@ -1,25 +1,17 @@
-"""Generated scenes and damaged files: each must give a plan, the right content, or a refusal that says what to do.
+"""Generated scenes, damaged files, imported pressures, random rings: each must give a plan, the right content, or a
+refusal that says what to do.
 
-    uv run python -m verification.robustness.fuzz [scenes | files | pressures | rings] [--count N] [--seed 0]
-
-10 000 scenes, 1 000 files, 2 000 imported pressures and 200 rings when left out. Writes its
-parts of docs/robustness.md and docs/robustness.json.
+Every measurement takes a folder to work in, a number of tries and a seed, and returns a dict: verdicts, faults, further
+numbers.
 """
 
-import argparse
 import contextlib
 import random
-import sys
-import tempfile
 import time
 import tomllib
 import traceback
 from collections import Counter
-from pathlib import Path
 
-from verification.robustness.page import check_page, write_part
-
-COUNTS = {"scenes": 10_000, "files": 1_000, "pressures": 2_000, "rings": 200}
 PYTHON_EVERY = 4  # every so many scenes also as Python dictionaries
 SIMULATED = 4  # of every base
 SHORT = {"stop": {"time": 0.01}, "output": {"interval": 0.005}}
@@ -45,26 +37,6 @@ records = 11
 "gate.angle" = [45.0, 90.0]
 "soils.0.porosity" = [0.4, 0.45]
 """
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", nargs="?", choices=tuple(COUNTS))
-    parser.add_argument("--count", type=int)
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
-    check_page()
-    faults = 0
-    for what in [options.what] if options.what else COUNTS:
-        count = options.count or COUNTS[what]
-        with tempfile.TemporaryDirectory(prefix="gush-fuzz-") as place:
-            begin = time.monotonic()
-            result = JUDGES[what](Path(place), count, options.seed)
-        result |= {"count": count, "seed": options.seed, "seconds": time.monotonic() - begin}
-        write_part(what, result)
-        print(what, result["verdicts"], *result["faults"], sep="\n  ")
-        faults += len(result["faults"])
-    sys.exit(bool(faults))
 
 
 def scenes(place, count, seed):
@@ -264,10 +236,3 @@ def rings(place, count, seed):
     faults = each(count, seed, "ring", one)
     return {"verdicts": dict(verdicts.most_common()), "reasons": dict(reasons.most_common()), "faults": faults,
             "largest_difference": max(differences, default=0.0)}  # fmt: skip
-
-
-JUDGES = {"scenes": scenes, "files": files, "pressures": pressures, "rings": rings}
-
-
-if __name__ == "__main__":
-    main()

@@ -1,61 +1,38 @@
 """Kill a small run at random moments, resume it, and compare with the uninterrupted run bit for bit.
 
-    uv run python -m verification.robustness.kills [--kills 200] [--seed 0]
-
-Writes its part of docs/robustness.md and docs/robustness.json. Every run is the command `gush run` in a process of its
-own that ends by SIGKILL at a moment drawn evenly over the life of the uninterrupted one: meshing, relaxation, stepping,
-writing, checkpoints, closing. Moments are measured in processor time of the run itself, which a busy machine does not
-stretch, and a kill counts only if the run's file does not say "finished" yet; others are drawn again. Processes are
-forked from one that has compiled the kernels, so that the kill falls into the run and not into its start.
+Every run is the command `gush run` in a process of its own that ends by SIGKILL at a moment drawn evenly over the life
+of the uninterrupted one: meshing, relaxation, stepping, writing, checkpoints, closing. Moments are measured in
+processor time of the run itself, which a busy machine does not stretch, and a kill counts only if the run's file does
+not say "finished" yet; others are drawn again. Processes are forked from one that has compiled the kernels, so that the
+kill falls into the run and not into its start.
 """
 
-import argparse
 import os
 import random
 import shutil
 import signal
-import sys
-import tempfile
 import time
 from collections import Counter
 from pathlib import Path
-
-from verification.robustness.page import check_page, write_part
 
 KILLED_AGAIN = 0.25  # share of the resumed runs that are killed once more
 FINISHED = "finished"
 PEEK = os.WEXITED | os.WNOHANG | os.WNOWAIT  # look for the end of a process without taking its exit code
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--kills", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
-    check_page()
-    with tempfile.TemporaryDirectory(prefix="gush-kills-") as place:
-        result = kill_and_resume(Path(place), options.kills, random.Random(options.seed))
-    result["seed"] = options.seed
-    write_part("kills", result)
-    for name, value in result.items():
-        print(f"{name}: {value}")
-    sys.exit(bool(result["different"]))
-
-
-def kill_and_resume(place, kills, draw):
-    """Kill and resume until `kills` kills have struck a run at work."""
+def kill_and_resume(place, count, seed):
+    """Kill and resume until so many kills have struck a run at work."""
     from coupling.runs.rerun import compare_bits
     from verification.small_event import small_scene
 
-    scene = place / "scene.toml"
+    draw, scene = random.Random(seed), place / "scene.toml"
     scene.write_text(small_scene(interior="sink", stop={"time": 0.08}).source, encoding="utf-8")
     command = ["run", "--no-figures", "--quiet", "--threads", "1", "--checkpoint-interval", "0"]
     # twice: the first run compiles
     run_here([*command, str(scene), "--out", str(place / "compiled")])
     life = life_of(forked([*command, str(scene), "--out", str(place / "whole")]), place / "whole")
-    struck, late, different, codes, found = 0, 0, [], Counter(), Counter()
-    begin = time.monotonic()
-    while struck < kills:
+    struck, late, faults, codes, found = 0, 0, [], Counter(), Counter()
+    while struck < count:
         folder = place / "killed"
         shutil.rmtree(folder, ignore_errors=True)
         start, again = [*command, str(scene), "--out", str(folder)], [*command, "--resume", "--out", str(folder)]
@@ -70,17 +47,15 @@ def kill_and_resume(place, kills, draw):
             # a run killed before it had written its scene has nothing to resume
             if not (folder / "scene.toml").exists():
                 again = [*start, "--overwrite"]
-            once_more = struck < kills and draw.random() < KILLED_AGAIN
+            once_more = struck < count and draw.random() < KILLED_AGAIN
             code = ended(forked(again), draw.uniform(0.0, life) if once_more else None)
         codes[code] += 1
         comparison = compare_bits(place / "whole", folder) if code == 0 else {"identical": False, "differences": code}
         if not comparison["identical"] or comparison["records_run"] != comparison["records_rerun"]:
-            different.append(str(comparison["differences"]))
-    return {
-        "kills": struck, "runs": sum(codes.values()), "identical": sum(codes.values()) - len(different),
-        "different": different, "found": dict(found), "late": late, "life_seconds": life,
-        "seconds": time.monotonic() - begin,
-    }  # fmt: skip
+            faults.append(str(comparison["differences"]))
+    runs = sum(codes.values())
+    return {"verdicts": dict(found), "faults": faults, "runs": runs, "identical": runs - len(faults), "late": late,
+            "life_seconds": life}  # fmt: skip
 
 
 def life_of(child, folder):
@@ -144,7 +119,3 @@ def ended(child, moment):
             time.sleep(max(left, 0.001))
         os.kill(child, signal.SIGKILL)
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-
-
-if __name__ == "__main__":
-    main()

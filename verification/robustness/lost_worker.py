@@ -1,23 +1,15 @@
 """A study on a dask scheduler with two worker processes, one of them killed in the middle, against a serial run.
 
-    uv run python -m verification.robustness.lost_worker           # 64 coarse runs; fewer, from 4 on, as an argument
-
-The study must end complete and equal to the serial one, bit for bit. Prints what happened as JSON and writes its part
-of docs/robustness.md and docs/robustness.json, with --print-only not.
+The study, of 4 runs at least, must end complete and equal to the serial one, bit for bit.
 """
 
-import argparse
-import json
 import os
 import signal
-import tempfile
 import time as clock
-from pathlib import Path
 
 import numpy as np
 
 import coupling
-from verification.robustness.page import check_page, write_part
 from verification.small_event import COARSE
 
 #: Of every run: how far it differs from nothing but where and when it was computed.
@@ -61,35 +53,22 @@ def killed_study(count, folder):
     return data, lines, killed
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("count", type=int, nargs="?", default=64, help="number of runs, from 4 on")
-    parser.add_argument("--print-only", action="store_true", help="leave docs/robustness.md as it is")
-    chosen = parser.parse_args()
-    count = chosen.count
-    if not chosen.print_only:
-        check_page()
-    with tempfile.TemporaryDirectory() as place:
-        begin = clock.monotonic()
-        parallel, lines, killed = killed_study(count, Path(place) / "parallel")
-        between = clock.monotonic()
-        serial = coupling.study(plan(count), Path(place) / "serial", workers=0).load()
-        end = clock.monotonic()
+def lost_worker(place, count, _seed):
+    """The study with a lost worker beside the serial one."""
+    begin = clock.monotonic()
+    parallel, _, killed = killed_study(count, place / "parallel")
+    between = clock.monotonic()
+    serial = coupling.study(plan(count), place / "serial", workers=0).load()
+    end = clock.monotonic()
     different = [
         name
         for name in serial.data_vars
         if name not in MEASURED and not np.array_equal(serial[name], parallel[name], equal_nan=True)
     ]
-    result = {
-        "runs": count, "workers_killed": len(killed), "finished": int((parallel["status"] == "finished").sum()),
-        "told_done": sum(line.endswith("done") for line in lines), "different_variables": different,
-        "parallel_seconds": between - begin, "serial_seconds": end - between,
+    finished = int((parallel["status"] == "finished").sum())
+    whole = killed and not different and finished == count
+    return {
+        "faults": [] if whole else ["not complete, not equal, or no worker was killed"], "finished": finished,
+        "workers_killed": len(killed), "different_variables": different, "parallel_seconds": between - begin,
+        "serial_seconds": end - between,
     }  # fmt: skip
-    if not chosen.print_only:
-        write_part("lost_worker", result)
-    print(json.dumps(result, indent=1))
-    raise SystemExit(0 if not different and result["finished"] == count and killed else 1)
-
-
-if __name__ == "__main__":
-    main()
