@@ -89,9 +89,19 @@ def docs_page(name, *blocks):
 
 
 def table(head, rows):
-    """Lines of a table; cells are shown by `str`."""
-    first, *others = ["| " + " | ".join(map(str, row)) + " |" for row in (head, *rows)]
+    """Lines of a table; cells are shown by `str`, bars in them, as of |Q|, escaped."""
+    cells = [[re.sub(r"(?<!\\)\|", r"\|", str(cell)) for cell in row] for row in (head, *rows)]
+    first, *others = ["| " + " | ".join(row) + " |" for row in cells]
     return [first, "|" + "---|" * len(head), *others]
+
+
+def table_text(head, rows):
+    """The same as one text, "Not run." without rows."""
+    rows = list(rows)
+    return "\n".join(table(head, rows)) if rows else "Not run."
+
+
+TEMPLATES.globals["table"] = table_text
 
 
 def write_data(path, data):

@@ -23,6 +23,12 @@ class Verdict(NamedTuple):
     high: float
     agrees: str
 
+    @property
+    def ours(self) -> str:
+        """Our value as the page shows it."""
+        value, more = self.statement.form.format(self.found.value), self.found.more
+        return f"{more} ({value})" if more else value
+
 
 def judged(
     statement: Statement,

@@ -1,16 +1,15 @@
-"""The page that sets our numbers beside the published ones: blocks that are computed, in a text that is written."""
+"""The page that sets our numbers beside the published ones: numbers that are computed, in a text that is written."""
 
 import re
 from datetime import UTC, datetime
 from functools import partial
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
 
 from coupling import postprocess
 from coupling.refused import SceneError
-from verification.pages import table
+from verification.pages import TEMPLATES, table_text
 from verification.published.bands import judged
 from verification.published.draw import CAPTIONS, draw_bands, draw_case, draw_cases, draw_twin
 from verification.published.evidence import RunEvidence, at_rest, provenance
@@ -61,30 +60,20 @@ def write_page(folder: str | Path, out: str | Path) -> dict:
     figures |= draw_bands(verdicts, images) | draw_case(case, images) | draw_cases(cases, images)
     missing = [f"case {k}" for k in range(1, 11) if f"case-{k}" not in runs] + ["twin tunnels"] * (twin is None)
     missing += [name for name in ("meshes", "unknowns", "twin-unknowns") if not finished(folder / name)]
-    blocks = {
-        "made": _made(case, missing),
-        "count": _count(verdicts),
-        **{group: _table(verdicts, statements(group)) for group in ("initial", "gushing", "twin")},
-        "disagreements": _disagreements(verdicts),
-        "unknowns": _changed(rows, COLUMNS),
-        "trends": _markdown(
-            ["statement", "ours", "agrees"], [(one.statement, one.ours, _word(one.agrees)) for one in trends(cases)]
-        ),
-        "cases": _cases(cases),
-        "meshes": _meshes(meshes),
-        "linings": _linings(case, rows),
-        "rates": _rates(case, rows),
-        "figures": [line for number in CAPTIONS if number in figures for line in _figure(number, figures[number], out)],
-        "rules": [_text("rules.md")],
-    }
+    shown = {number: path.relative_to(out).as_posix() for number, path in figures.items()}
+    text = TEMPLATES.get_template("published.md").render(
+        **_about(case, rows), verdicts=verdicts, missing=missing, captions=CAPTIONS, figures=shown, columns=COLUMNS,
+        linings=LININGS, stated=partial(_stated, verdicts), changed=_changed, rows=rows, cases=list(_cases(cases)),
+        meshes=list(_meshes(meshes)), trends=[(one.statement, one.ours, _word(one.agrees)) for one in trends(cases)],
+    )  # fmt: skip
     page = out / "published.md"
-    page.write_text(_filled(_text("page.md"), blocks), encoding="utf-8")
+    page.write_text(text, encoding="utf-8")
     answers = [
-        {"statement": v.statement.text, "published": v.statement.published, "ours": _ours(v), "low": v.low,
+        {"statement": v.statement.text, "published": v.statement.published, "ours": v.ours, "low": v.low,
          "high": v.high, "agrees": v.agrees, "rule": v.statement.rule} for v in verdicts.values()
     ]  # fmt: skip
-    shown = {number: str(path) for number, path in figures.items()}
-    return {"page": str(page), "figures": shown, "answers": answers, "missing": missing}
+    files = {number: str(path) for number, path in figures.items()}
+    return {"page": str(page), "figures": files, "answers": answers, "missing": missing}
 
 
 def judge_case(case: RunEvidence, meshes: dict[float, RunEvidence], unknowns):
@@ -128,57 +117,45 @@ def _by_mesh(others, runs, folder):
     return found
 
 
-def _made(case, missing):
+def _about(case, rows):
+    """What the page says of case 3 besides its statements: source, meshes, rates, and the source's own lining."""
     from coupling.scenes.scene import load_scene
 
-    mesh, source = case.scene.discretisation, published_numbers()["source"]
-    look = "" if mesh == load_scene("case-3").discretisation else " --quick"
-    text = (
-        f"Made by `gush published{look}` on {datetime.now(UTC):%Y-%m-%d} from runs of {provenance(case.folder)}; case "
-        f"3 on elements of {mesh.element_size:g} m, {mesh.element_size_lining:g} m at the lining, "
-        f"{mesh.elements_across_gate} across the gate. Published: {source}; angles from the crown, clockwise; per "
-        f"metre of tunnel; at {case.compared:.0f} kg/m unless said."
-    )
-    return [text + (f" Not finished, so left out: {', '.join(missing)}." if missing else "")]
+    numbers, tunnel = published_numbers(), case.scene.tunnels[case.scene.gate.tunnel]
+    size, radii = SOURCE_MESH["element_size"], (tunnel.outer_radius, tunnel.inner_radius)
+    published = next(row["published"] for row in numbers["gushing"] if row["key"] == "rate")
+    rates = [("published", float(published)), *independent_rates(case.scene).items()]
+    rates += [(f"ours, {words}", said["rate"].value) for words, said in rows if "rate" in said]
+    return {
+        "case": case, "mesh": case.scene.discretisation, "own_mesh": load_scene("case-3").discretisation,
+        "source": numbers["source"], "reasons": numbers["reasons"], "provenance": provenance(case.folder),
+        "date": f"{datetime.now(UTC):%Y-%m-%d}",
+        "rates": [(name, f"{value:.3g}") for name, value in sorted(rates, key=lambda item: -item[1])],
+        "layer": {"size": size, "thickness": radii[0] - radii[1],
+                  "stiffness": one_layer(size, *radii, tunnel.lining_poissons_ratio)},
+        "moving": rows[:1] + [row for row in rows[1:] if row[0].startswith("lining")],
+    }  # fmt: skip
 
 
-def _count(verdicts):
-    words = [one.agrees for one in verdicts.values() if one.agrees]
-    yes, band = (words.count(word) for word in ("yes", "in the band"))
-    text = f"**{yes + band} of {len(words)} statements agree**: {yes} as run, {band} in the band of what the source"
-    return [f"{text} does not state; {words.count('no')} do not."]
-
-
-def _ours(verdict):
-    value, more = verdict.statement.form.format(verdict.found.value), verdict.found.more
-    return f"{more} ({value})" if more else value
-
-
-def _table(verdicts, stated):
+def _stated(verdicts, group):
+    """Table of the statements of a group."""
     rows = []
-    for v in (verdicts[key] for key in stated if key in verdicts):
+    for v in (verdicts[key] for key in statements(group) if key in verdicts):
         form = _bare(v.statement.form)
         band = f"{form.format(v.low)} .. {form.format(v.high)}" if v.high > v.low else ""
         mesh = form.format(v.mesh).replace("+", "") if v.mesh else ""
         signed = form.replace("{:+", "{:").replace("{:", "{:+")
         shares = [f"{name} {signed.format(low)} .. {signed.format(high)}" for name, (low, high) in v.shares.items()]
         word = v.agrees if v.agrees != "no" else _word(False)
-        rows.append((v.statement.text, v.statement.published, _ours(v), mesh, band, word, v.statement.rule,
+        rows.append((v.statement.text, v.statement.published, v.ours, mesh, band, word, v.statement.rule,
                      "; ".join(shares[:3])))  # fmt: skip
-    return _markdown(["statement", "published", "ours", "mesh ±", "band", "agrees", "rule", "largest shares"], rows)
+    head = ("statement", "published", "ours", "mesh ±", "band", "agrees", "rule", "largest shares")
+    return table_text(head, rows)
 
 
 def _bare(form):
     """A form without the words around its number."""
     return re.search(r"\{:[^}]*\}", form)[0]
-
-
-def _disagreements(verdicts):
-    reasons = published_numbers()["reasons"]
-    wrong = {key: v for key, v in verdicts.items() if v.agrees == "no"}
-    lines = [f"- **{v.statement.text}**: published {v.statement.published}, ours {_ours(v)}. "
-             + reasons.get(key, "Reason: unknown.") for key, v in wrong.items()]  # fmt: skip
-    return lines or ["None."]
 
 
 def _changed(rows, columns):
@@ -189,25 +166,7 @@ def _changed(rows, columns):
         (words, *(form.format(found[key].value) if key in found else "not reached" for key, form in forms.items()))
         for words, found in rows
     ]
-    return _markdown(["changed", *columns.values()], lines)
-
-
-def _linings(case, rows):
-    tunnel, size = case.scene.tunnels[case.scene.gate.tunnel], SOURCE_MESH["element_size"]
-    stiff = one_layer(size, tunnel.outer_radius, tunnel.inner_radius, tunnel.lining_poissons_ratio)
-    moving = [row for row in rows[1:] if row[0].startswith("lining")]
-    thick = tunnel.outer_radius - tunnel.inner_radius
-    text = f"One layer of linear triangles of {size:g} m through {thick:.2f} m resists the second harmonic"
-    text += f" **{stiff:.1f} times** as much as the ring does (plane strain, against quadratic triangles)."
-    return [text, "", *_changed(rows[:1] + moving, LININGS)]
-
-
-def _rates(case, rows):
-    published = next(row["published"] for row in published_numbers()["gushing"] if row["key"] == "rate")
-    found = [("published", float(published)), *independent_rates(case.scene).items()]
-    found += [(f"ours, {words}", said["rate"].value) for words, said in rows if "rate" in said]
-    found.sort(key=lambda item: -item[1])
-    return _markdown(["rate", "kg/m/s"], [(name, f"{value:.3g}") for name, value in found])
+    return table_text(["changed", *columns.values()], lines)
 
 
 def _extremes(response, mass):
@@ -219,7 +178,6 @@ def _extremes(response, mass):
 
 def _cases(cases):
     """Largest forces of all cases at 1000 kg/m, or where they ended, in brackets initially, by both lining models."""
-    rows = []
     for name, run in cases.items():
         scene = run.scene
         about = [name, f"{scene.gate.angle:g}°", f"{scene.tunnels[0].cover:g} m", scene.soils[0].name]
@@ -227,46 +185,19 @@ def _cases(cases):
         for model, response in run.responses.items():
             pairs = zip(_extremes(response, run.compared), _extremes(response, None), strict=True)
             cells = [f"{after:.0f} ({before:.0f})" for after, before in pairs]
-            rows.append((*about, model, *cells, f"{run.compared:.0f} kg/m, {time:.2f} s"))
-    head = ["case", "gate", "cover", "soil", "model", "N kN/m", "Q kN/m", "M kN m/m", "M least kN m/m", "at"]
-    return _markdown(head, rows)
+            yield (*about, model, *cells, f"{run.compared:.0f} kg/m, {time:.2f} s")
 
 
 def _meshes(meshes):
     """Cases on several meshes: what must not depend on them, at the largest inflow mass that all reached."""
-    rows = []
     for name, sizes in meshes.items():
         mass = min(run.compared for run in sizes.values())
         for size, run in sorted(sizes.items()):
             time = float(postprocess.at_inflow(run.history, mass)["time"])
             down = 1e3 * run.settled(mass)
             cells = [f"{value:.0f}" for value in _extremes(run.responses["beam-spring"], mass)]
-            rows.append((name, f"{size:.2g} times", f"{mass:.0f}", f"{time:.3f}", *cells, f"{down:.1f}"))
-    return _markdown(["scene", "mesh", "at kg/m", "time s", "N", "Q", "M", "M least", "settlement mm"], rows)
-
-
-def _figure(number, path, out):
-    title = f"Figure {number.lstrip('0')}" if number[0].isdigit() else "Bands"
-    text = CAPTIONS[number]
-    return [f"**{title}**: {text}.", "", f"![{text}]({path.relative_to(out).as_posix()})", ""]
-
-
-def _markdown(head, rows):
-    """Lines of a table; bars inside its cells, as of |Q|, are escaped."""
-    if not rows:
-        return ["Not run."]
-    head, *rows = [[re.sub(r"(?<!\\)\|", "\\|", cell) for cell in row] for row in (head, *rows)]
-    return table(head, rows)
+            yield name, f"{size:.2g} times", f"{mass:.0f}", f"{time:.3f}", *cells, f"{down:.1f}"
 
 
 def _word(agrees):
     return "yes" if agrees else "**no**"
-
-
-def _text(name):
-    return (resources.files("verification") / "published" / name).read_text(encoding="utf-8").rstrip()
-
-
-def _filled(text, blocks):
-    """The text with lines `{{name}}` replaced by the lines of that block."""
-    return re.sub(r"^\{\{(\S+)\}\}$", lambda found: "\n".join(blocks[found[1]]), text, flags=re.MULTILINE) + "\n"
