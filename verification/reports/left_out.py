@@ -17,7 +17,7 @@ import mpm
 from coupling.datasets import RunWriter
 from coupling.files.provenance import root_attributes
 from verification.boxes import run_to
-from verification.pages import DOCS, docs_page, made_by, table, write_data
+from verification.pages import DOCS, docs_page, made_by, rendered, write_data
 from verification.speed.stepping import FULL, variants
 
 BEGIN, ROUNDS, SPELL = 0.15, 12, 0.015  # simulated seconds after the gate opened, and of a round
@@ -79,33 +79,13 @@ def measure(scene):
     return rows, solvers[FULL]
 
 
-def blocks(data):
-    """Generated blocks of docs/left-out.md."""
-    head = (
-        "scene", "left out, and how", "points", "levels", "smallest step [us]", "CPU s a simulated s", "of base",
-        "ns a point-step", "of base", "MB", "of base",
-    )  # fmt: skip
-    snapshot = data["snapshot"]
-    return {
-        "rows": table(head, (
-            (r["name"], r["without"], r["points"], r["levels"], f"{1e6 * r['dt']:.0f}", f"{r['seconds_a_second']:.2f}",
-             f"{r['seconds_a_second_of_base']:.2f}", f"{1e9 * r['seconds_a_point_step']:.0f}",
-             f"{r['seconds_a_point_step_of_base']:.2f}", f"{r['bytes'] / 1e6:.1f}", f"{r['bytes_of_base']:.2f}")
-            for r in data["rows"]
-        )),
-        "snapshot": f"Pressures only (`output.points = false`) saves {1e3 * snapshot['seconds']:.0f} ms and "
-        f"{snapshot['bytes'] / 1e6:.2f} MB of the run's file a snapshot; the steps are the same. "
-        f"{data['contact_nodes']} of {data['nodes']} nodes touch a lining.",
-    }  # fmt: skip
-
-
 def main():
     page, scene = docs_page("left-out", "made", "rows", "snapshot"), coupling.load_scene("case-3")
     rows, full = measure(scene)
     seconds, size = snapshot_cost(scene)
     data = {"rows": rows, "snapshot": {"seconds": seconds, "bytes": size}, "contact_nodes": full.n_contact,
             "nodes": len(full.mesh.nodes)}  # fmt: skip
-    page.fill({"made": made_by("uv run python -m verification.reports.left_out"), **blocks(data)})
+    page.fill({"made": made_by("uv run python -m verification.reports.left_out"), **rendered("left-out", **data)})
     write_data(DOCS / "left-out.json", data)
 
 

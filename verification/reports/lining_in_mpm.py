@@ -15,7 +15,7 @@ from coupling.datasets import cell_centres, cell_mean_weights
 from coupling.files.provenance import root_attributes
 from structure.response import FORCES, PRESSURES
 from verification.loads import theory_pressures
-from verification.pages import DOCS, docs_page, made_by, provenance, table, write_data
+from verification.pages import DOCS, docs_page, made_by, provenance, rendered, write_data
 from verification.problems import exact_rings
 from verification.speed.stepping import timed
 
@@ -218,79 +218,14 @@ def closed_forms(scene, ring):
     }
 
 
-ENDS = ("N_max", "N_min", "Q_max", "M_max", "M_min", "M_crown", "M_invert")
-HEAD = ("", "N max", "N min", "largest abs. Q", "M max", "M min", "M crown", "M invert")
-MOMENTS = ("M max", "M crown", "M invert")
-
-
-def state_tables(events, when):
-    """Pressures, forces and joints' moments of one state: lines."""
-    rows, now = [], {kind: events[kind][when] for kind in KINDS}
-    for kind, state in now.items():
-        cells = [f"{state[name][p] / 1e3:.0f}" for name in ("soil_pressure", "water_pressure") for p, _ in PLACES]
-        rows.append((kind, *cells, f"{state['rise']:.1f}, {state['ovalisation']:.1f}" if "rise" in state else "held"))
-    lines = table(("lining", *(f"{phase} {p}" for phase in ("soil", "water") for p, _ in PLACES),
-                   "rise, ovalisation mm"), rows)  # fmt: skip
-    rows = [
-        (f"{kind}: {how}", *(f"{now[kind][key][end]:.0f}" for end in ENDS))
-        for key, how, kinds in (
-            ("ring", "jointed ring in soil springs", KINDS), ("alone", "ring alone, no joints, no springs", KINDS),
-            ("own", "the ring's own", OWN_FORCES),
-        )
-        for kind in kinds
-    ]  # fmt: skip
-    lines += ["", *table(HEAD, rows), ""]
-    joints = ((kind, *(f"{m:.0f}" for m in now[kind]["joints"])) for kind in KINDS)
-    return [*lines, *table(("M of joints, ring in soil springs", *"123456"), joints)]
-
-
-def moments(data, digits=0):
-    """Rows of largest moment and those at crown and invert."""
-    keys = ("M_max", "M_crown", "M_invert")
-    return [(what, *(f"{e[key]:.{digits}f}" for key in keys)) for what, e in data.items()]
-
-
-def blocks(data):
-    """Generated blocks of docs/lining-in-mpm.md."""
-    events, cost, theory = data["events"], data["cost"], data["theory"]
-    span = [1e3 * events[kind]["late_seconds"] for kind in KINDS]
-    work = {kind: events[kind]["seconds"] / events[kind]["time"] for kind in KINDS}
-    joints = [[f"{m:.0f}" for m in e["joints"][:3]] for e in theory.values()]
-    rows = [
-        (kind, f"{cost[kind]['seconds_a_second'] / cost['fixed']['seconds_a_second']:.2f}",
-         f"{work[kind] / work['fixed']:.2f}",
-         cost[kind]["relaxation_steps"], *(f"{e[key]:.1f}" for key in ("relaxation_seconds", "seconds")),
-         f"{e['time']:.3f}", e["steps"], e["returned"])
-        for kind, e in events.items()
-    ]  # fmt: skip
-    head = (
-        "lining", "case 3: work a simulated s over fixed", "quick: the same, to 100 kg/m", "relaxation steps",
-        "quick: relaxation s", "stepping s", "s to 100 kg/m", "steps", "points put back at walls",
-    )  # fmt: skip
-    forms = [(what, *(f"{e[key]:.0f}" for key in ("bonded", "full slip"))) for what, e in
-             data["einstein_schwartz"].items()]  # fmt: skip
-    why = [
-        *table(("elastic lining, initial state", *MOMENTS), moments(data["why"])), "",
-        *table(("theory loads on the beam-spring ring", *MOMENTS, "joint 1", "joint 2", "joint 3"),
-               ((*row, *(of or [""] * 3)) for row, of in zip(moments(theory), joints, strict=True))), "",
-        *table(("Einstein & Schwartz (1979), largest M", "bonded", "full slip"), forms),
-    ]  # fmt: skip
-    return {
-        "initial": state_tables(events, "initial"),
-        "late": [*state_tables(events, "late"), "", f"A mean over {min(span):.0f} to {max(span):.0f} ms."],
-        "why": why,
-        "harmonics": table(("harmonics", *MOMENTS), moments(data["harmonics"], 1)),
-        "cost": table(head, rows),
-    }
-
-
 def main():
     page = docs_page("lining-in-mpm", "made", "initial", "late", "why", "harmonics", "cost")
     data = measure()
     attributes, machine = root_attributes(coupling.load_scene("quick")), provenance()["machine"]
     data["provenance"] = {k: str(attributes[k]) for k in ("revision", "versions", "created")} | {"machine": machine}
     write_data(DOCS / "lining-in-mpm.json", data)
-    page.fill({"made": made_by("uv run python -m verification.reports.lining_in_mpm"), **blocks(data)})
+    made = made_by("uv run python -m verification.reports.lining_in_mpm")
+    page.fill({"made": made, **rendered("lining-in-mpm", **data)})
 
 
 if __name__ == "__main__":
