@@ -31,6 +31,7 @@ def accuracy_command(
     """
     with answering(json_path) as answer:
         from verification.accuracy.report import problem_ladders
+        from verification.pages import rendered
         from verification.sensitivity.mesh import scene_ladder
 
         tell = Console(stderr=True).print
@@ -39,15 +40,8 @@ def accuracy_command(
         else:
             data = problem_ladders(problems or [], fast, out, tell)
         if answer(data):
-            rows = (
-                (name, f"{row['error']:.2e}",
-                 f"{row['limit']:.2g}" if row["within"] else f"[red]{row['limit']:.2g} exceeded[/red]",
-                 f"{row['cpu_seconds']:.2f}", f"{row['excess']:.2f}")
-                for name, row in data.get("problems", {}).items()
-            )  # fmt: skip
             if scene is None:
-                heads = ("problem", "error", "limit", "CPU s", "default over the best of what costs no more")
-                Console().print(table(heads, rows))
+                _show(rendered("accuracy", problems=data["problems"]))
             say(f"page: {data['page']}")
 
 

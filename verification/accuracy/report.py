@@ -7,9 +7,7 @@ from pathlib import Path
 from coupling.figures.picture import logarithmic_axis
 from coupling.refused import Refused
 from verification.accuracy.ladders import assess, dataset, measure
-from verification.pages import Page, made_by, picture, provenance, table
-
-BLOCKS = ("made", "overview", "problems")
+from verification.pages import made_by, picture, provenance, rendered, templated_page
 
 
 def problem_ladders(names, only_fast, out, tell):
@@ -28,30 +26,24 @@ def problem_ladders(names, only_fast, out, tell):
             near = difflib.get_close_matches(name, known, 1)
             hint = f"did you mean {near[0]!r}? " if near else ""
             raise Refused(f"problem: must be a verification problem, got {name!r}; {hint}known: {', '.join(known)}")
-    page = Page(folder / "accuracy.md", "Error against run time", BLOCKS)
+    page = templated_page(folder, "accuracy")
     rows = {name: measure(known[name], only_fast, tell) for name in names or known}
     return write(rows, known, page)
 
 
 def write(rows, problems, page):
     """Write page, pictures and data of rows by problem, those of :func:`verification.accuracy.ladders.measure`."""
-    folder = page.path.parent
+    folder, images = page.path.parent, page.path.parent / "images"
     summary = {name: _summary(mine, problems[name]) for name, mine in rows.items()}
-    overview(summary, folder / "images" / "accuracy-overview.png")
-    lines = []
-    for name, entry in summary.items():
-        orders = ", ".join(f"{key} {order:.2f}" for key, order in entry["orders"].items() if math.isfinite(order))
-        link = f"[{name}](#{name.lower()})"
-        lines.append([
-            link, f"{entry['error']:.2e}", f"{entry['limit']:.2g}", f"{entry['cpu_seconds']:.2f}", orders or "-",
-            f"{entry['excess']:.2f}",
-        ])  # fmt: skip
-    head = ("problem", "error", "limit", "CPU s", "observed orders", "default over the front")
-    page.fill({
-        "made": made_by("gush accuracy"),
-        "overview": ["![overview](images/accuracy-overview.png)", "", *table(head, lines)],
-        "problems": [line for name, mine in rows.items() for line in _section(problems[name], mine, folder)],
-    })  # fmt: skip
+    overview(summary, images / "accuracy-overview.png")
+    runs = []
+    for name, mine in rows.items():
+        if len(mine) > 1:
+            draw(problems[name], mine, images / f"accuracy-{name}.png")
+        front = assess(mine)["front"]
+        shown = [row | {"on_front": best} for row, best in zip(mine, front, strict=True)]
+        runs.append((problems[name], shown))
+    page.fill({"made": made_by("gush accuracy"), **rendered("accuracy", problems=summary, runs=runs)})
     data = dataset([row for mine in rows.values() for row in mine])
     made = provenance()
     data.attrs = {"title": "error against run time", "revision": made["revision"], "created": made["date"]}
@@ -65,25 +57,6 @@ def _summary(rows, problem):
         "error": default["error"], "limit": problem.limit, "within": bool(default["error"] <= problem.limit),
         "cpu_seconds": default["cpu_seconds"], "orders": verdict["orders"], "excess": verdict["excess"],
     }  # fmt: skip
-
-
-def _section(problem, rows, folder):
-    lines = [
-        f"## {problem.name}", "",
-        f"{problem.title}. Reference: {problem.source}. Error: {problem.norm}. Limit {problem.limit:g}: {problem.why}",
-        "",
-    ]  # fmt: skip
-    if len(rows) > 1:
-        name = f"images/accuracy-{problem.name}.png"
-        draw(problem, rows, folder / name)
-        lines += [f"![{problem.name}]({name})", ""]
-    cells = []
-    for row, best in zip(rows, assess(rows)["front"], strict=True):
-        value = ", ".join(f"{k} = {v}" for k, v in problem.fast.items()) if row["value"] is None else row["value"]
-        numbers = (f"{row['error']:.2e}", f"{row['cpu_seconds']:.2f}", row["steps"], row["points"], "yes" * best)
-        failed = (f"failed: {row['failure']}", "", "", "", "")
-        cells.append([row["setting"], value, *(failed if row["failure"] else numbers)])
-    return [*lines, *table(("setting", "value", "error", "CPU s", "steps", "points", "on the front"), cells), ""]
 
 
 def draw(problem, rows, path):
