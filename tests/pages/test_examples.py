@@ -89,7 +89,7 @@ def test_impossible_efficiency_is_refused(example, ring, efficiency):
 
 
 def test_figures_of_the_ring_are_drawn_by_their_script(tmp_path):
-    command = [sys.executable, "-W", "error", "-m", "verification.reports.ring", tmp_path]
+    command = [sys.executable, "-W", "error", "-m", "verification.reports", "ring", tmp_path]
     subprocess.run(command, cwd=ROOT, check=True)
     assert {path.name for path in tmp_path.iterdir()} == {"joint_laws.png", "ring_checks.png"}
 

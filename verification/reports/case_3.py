@@ -1,12 +1,11 @@
 """Everything that the main job must show, from one run of case 3: a table, its data and the pictures for the docs.
 
-    uv run python -m verification.reports.case_3                 # runs case 3 into runs/case-3 (minutes), then reports
-    uv run python -m verification.reports.case_3 --run FOLDER    # reports on a finished run
+    uv run python -m verification.reports case-3           # runs case 3 into runs/case-3 (minutes), then reports
+    uv run python -m verification.reports case-3 FOLDER    # reports on a finished run
 
 Writes docs/case-3.md, docs/case-3.json and docs/images/case-3-*.png.
 """
 
-import argparse
 import shutil
 from pathlib import Path
 
@@ -28,8 +27,9 @@ from coupling.datasets import (
 from structure.response import FORCES
 from verification.boxes import run_to
 from verification.loads import theory_pressures
-from verification.pages import DOCS, docs_page, made_by, provenance, table, write_data
+from verification.pages import DOCS, made_by, provenance, table, write_data
 
+BLOCKS = ("measured", "forces")
 SETTLING = 3.0  # s
 PICTURES = ("fields", "pressures", "internal_forces", "inflow")
 
@@ -138,17 +138,26 @@ def forces(folder):
         yield mass, *cells, " ".join(f"{v * 1e3:.2f}" for v in now["joint_rotation"].values)
 
 
-def report(folder, page):
-    """Fill the page, and write its data and its pictures."""
+def blocks(folder=None):
+    """Everything, with the data of the page and its pictures."""
+    if folder is None:
+        folder = Path("runs/case-3")
+        coupling.run(coupling.load_scene("case-3"), out=folder, overwrite=True, figures=True)
     rows, data = measured(folder)
     attributes, history = read_attributes(folder), read_history(folder)
     steps, points = int(history["steps"][-1]), int(history["point_steps"][-1])
     seconds, wall = (float(attributes[f"{kind}_seconds"]) for kind in ("cpu", "wall"))
     verdict = {True: "yes", False: "**no**"}
-    page.fill({
-        "made": f"{made_by('uv run python -m verification.reports.case_3', attributes['revision'])} "
-        f"{steps} steps, {points / 1e9:.2f} thousand million point-steps, {seconds:.0f} s of processor time, "
-        f"{wall:.0f} s by the clock.",
+    made = made_by("uv run python -m verification.reports case-3", attributes["revision"])
+    data["provenance"] = {key: str(attributes[key]) for key in ("revision", "versions", "created", "scene_sha256")} | {
+        "machine": provenance()["machine"], "cpu_seconds": seconds, "steps": steps, "point_steps": points,
+    }  # fmt: skip
+    write_data(DOCS / "case-3.json", data)
+    for name in PICTURES:
+        shutil.copy(Path(folder) / "figures" / f"{name}.png", DOCS / "images" / f"case-3-{name.replace('_', '-')}.png")
+    return {
+        "made": f"{made} {steps} steps, {points / 1e9:.2f} thousand million point-steps, {seconds:.0f} s of processor "
+        f"time, {wall:.0f} s by the clock.",
         "measured": table(
             ("what", "wanted", "measured", "met"),
             ((what, wanted, text, verdict[bool(met)]) for what, wanted, text, met in rows),
@@ -157,27 +166,4 @@ def report(folder, page):
             ("inflow kg/m", "N max kN", "N min kN", "Q max kN", "Q min kN", "M max kN m", "M min kN m",
              "joint rotations mrad"), forces(folder),
         ),
-    })  # fmt: skip
-    data["provenance"] = {key: str(attributes[key]) for key in ("revision", "versions", "created", "scene_sha256")} | {
-        "machine": provenance()["machine"], "cpu_seconds": seconds, "steps": steps, "point_steps": points,
     }  # fmt: skip
-    write_data(DOCS / "case-3.json", data)
-    for name in PICTURES:
-        shutil.copy(Path(folder) / "figures" / f"{name}.png", DOCS / "images" / f"case-3-{name.replace('_', '-')}.png")
-    return rows
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--run", type=Path, help="folder of a finished run of case 3")
-    folder = parser.parse_args().run
-    page = docs_page("case-3", "made", "measured", "forces")
-    if folder is None:
-        folder = Path("runs/case-3")
-        coupling.run(coupling.load_scene("case-3"), out=folder, overwrite=True, figures=True)
-    for what, wanted, text, met in report(folder, page):
-        print(f"{'met ' if met else 'FAIL'}  {what}: {text} (wanted {wanted})")
-
-
-if __name__ == "__main__":
-    main()

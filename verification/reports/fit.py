@@ -1,9 +1,8 @@
 """Numbers of docs/fit-coverage.md: how often the bands of a fit hold the truth, runs left out in turn being the truths.
 
-uv run python -m verification.reports.fit [FOLDER]    # 128 runs of some seconds each, kept in FOLDER; then some minutes
+uv run python -m verification.reports fit-coverage [FOLDER]    # 128 runs of some seconds, kept in FOLDER; minutes
 """
 
-import sys
 import time as clock
 from pathlib import Path
 
@@ -18,9 +17,10 @@ from coupling.fits.prior import places_of, read_plan
 from coupling.measurements.measurement import Measurement, error_covariance
 from coupling.postprocess.extremes import shown_extreme
 from coupling.studies.execute import study
-from verification.pages import docs_page, made_by, table
+from verification.pages import made_by, table
 from verification.small_event import small_scene
 
+BLOCKS = ("coverage", "emulators")
 #: Runs that an emulator is made of; parts of all runs that are truths in turn.
 SIZES, PARTS = (32, 64, 96), 4
 #: Places over the prior whose weights make a posterior.
@@ -160,18 +160,16 @@ def coverage_rows(plan, found):
     return rows
 
 
-def main(folder="fit-coverage"):
-    """Run, fit and write the page."""
-    begin = clock.perf_counter()
-    page = docs_page("fit-coverage", "made", "coverage", "emulators")
-    plan = read_plan(PLAN)
+def blocks(folder="fit-coverage"):
+    """Run, fit and count."""
+    begin, plan = clock.perf_counter(), read_plan(PLAN)
     seconds = run_all(Path(folder), plan)
     given = measurements(*([1.0] * sum(len(row[-1]) for row in MEASURED),) * 2)
     ensemble = read_ensemble(plan, given, Path(folder) / "ensemble")
     found = [trials_of(plan, ensemble, size) for size in SIZES]
     emulator = observe(ensemble).emulator
     wall, runs = clock.perf_counter() - begin, len(ensemble.places)
-    made = made_by("python -m verification.reports.fit")
+    made = made_by("uv run python -m verification.reports fit-coverage")
     least, most = binom.interval(0.9, runs, np.ptp(LEVELS))
     cost = (f"{runs} runs of {seconds / runs:.1f} CPU seconds each, {ensemble.failed} failed; {wall / 60:.1f} minutes "
             f"for all that was not there yet. Of {runs} bands of 90 % that know themselves {least:.0f} to {most:.0f} "
@@ -180,15 +178,9 @@ def main(folder="fit-coverage"):
         (one.quantity, one.place_text, f"{one.time:g} s", f"{error:.3g} {one.unit}", f"{explained:.1%}", f"{own:.2f}")
         for one, error, explained, own in zip(given, *emulator.validation, strict=True)
     ]
-    coverage = table(("90 % band of", *(f"{size} runs" for size in SIZES)), coverage_rows(plan, found))
-    page.fill({
+    return {
         "made": f"{made} {cost}",
-        "coverage": coverage,
+        "coverage": table(("90 % band of", *(f"{size} runs" for size in SIZES)), coverage_rows(plan, found)),
         "emulators": table(("measured", "where", "when", "error left out", "variance explained", "error over its own"),
                            checks),
-    })  # fmt: skip
-    print("\n".join(coverage), cost, sep="\n")
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])
+    }  # fmt: skip

@@ -3,7 +3,7 @@
 Scenes are compared over the same simulated time: steps of scenes differ in length, and long steps in the number of
 short ones within them.
 
-    uv run python -m verification.reports.left_out    # about four minutes; writes docs/left-out.md and .json
+    uv run python -m verification.reports left-out    # about four minutes; writes docs/left-out.md and .json
 """
 
 import statistics
@@ -17,9 +17,10 @@ import mpm
 from coupling.datasets import RunWriter
 from coupling.files.provenance import root_attributes
 from verification.boxes import run_to
-from verification.pages import DOCS, docs_page, made_by, rendered, write_data
+from verification.pages import DOCS, rendered, write_data
 from verification.speed.stepping import FULL, variants
 
+BLOCKS = ("rows", "snapshot")
 BEGIN, ROUNDS, SPELL = 0.15, 12, 0.015  # simulated seconds after the gate opened, and of a round
 
 
@@ -79,15 +80,12 @@ def measure(scene):
     return rows, solvers[FULL]
 
 
-def main():
-    page, scene = docs_page("left-out", "made", "rows", "snapshot"), coupling.load_scene("case-3")
+def blocks():
+    """Everything, and docs/left-out.json."""
+    scene = coupling.load_scene("case-3")
     rows, full = measure(scene)
     seconds, size = snapshot_cost(scene)
     data = {"rows": rows, "snapshot": {"seconds": seconds, "bytes": size}, "contact_nodes": full.n_contact,
             "nodes": len(full.mesh.nodes)}  # fmt: skip
-    page.fill({"made": made_by("uv run python -m verification.reports.left_out"), **rendered("left-out", **data)})
     write_data(DOCS / "left-out.json", data)
-
-
-if __name__ == "__main__":
-    main()
+    return rendered("left-out", **data)

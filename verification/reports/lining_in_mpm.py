@@ -1,6 +1,6 @@
 """What a lining that floats or deforms in the soil computation changes, and what it costs: coarse case 3 to 100 kg/m.
 
-uv run python -m verification.reports.lining_in_mpm    # some two minutes; docs/lining-in-mpm.*
+uv run python -m verification.reports lining-in-mpm    # some two minutes; docs/lining-in-mpm.*
 """
 
 import time as clock
@@ -15,10 +15,11 @@ from coupling.datasets import cell_centres, cell_mean_weights
 from coupling.files.provenance import root_attributes
 from structure.response import FORCES, PRESSURES
 from verification.loads import theory_pressures
-from verification.pages import DOCS, docs_page, made_by, provenance, rendered, write_data
+from verification.pages import DOCS, provenance, rendered, write_data
 from verification.problems import exact_rings
 from verification.speed.stepping import timed
 
+BLOCKS = ("initial", "late", "why", "harmonics", "cost")
 OTHER_K0 = 0.577  # 1 - sin(phi); the scenes have that of gravity loading
 KINDS = ("fixed", "floating", "elastic", "jointed")
 OWN_FORCES = ("elastic", "jointed")
@@ -218,15 +219,10 @@ def closed_forms(scene, ring):
     }
 
 
-def main():
-    page = docs_page("lining-in-mpm", "made", "initial", "late", "why", "harmonics", "cost")
+def blocks():
+    """Everything, and docs/lining-in-mpm.json."""
     data = measure()
     attributes, machine = root_attributes(coupling.load_scene("quick")), provenance()["machine"]
     data["provenance"] = {k: str(attributes[k]) for k in ("revision", "versions", "created")} | {"machine": machine}
     write_data(DOCS / "lining-in-mpm.json", data)
-    made = made_by("uv run python -m verification.reports.lining_in_mpm")
-    page.fill({"made": made, **rendered("lining-in-mpm", **data)})
-
-
-if __name__ == "__main__":
-    main()
+    return rendered("lining-in-mpm", **data)

@@ -1,10 +1,9 @@
 """Pictures and tables of docs/ring.md: joint laws, an example of checks, errors of the beam-spring ring and its cost.
 
-uv run python -m verification.reports.ring [FOLDER]    # only the pictures, into a folder, when given
+uv run python -m verification.reports ring [FOLDER]    # only the pictures, into a folder, when given
 """
 
 import re
-import sys
 import time as clock
 import tomllib
 from pathlib import Path
@@ -19,9 +18,10 @@ from coupling.scenes.scene import load_scene
 from structure import BeamSpringLining, Limits, check
 from structure.joint_laws import contact_moment, limited_shear
 from verification.loads import falling_pressures
-from verification.pages import DOCS, docs_page, made_by, picture, table
+from verification.pages import DOCS, docs_page, picture, table
 from verification.problems import exact_rings
 
+BLOCKS = ("closed form", "cost")
 STIFFNESS, HEIGHT, RECORDS = 5e8, 0.175, 1000  # N m/rad per metre, m
 LINEAR = {"law": "linear", "two_way": True}
 ALL = {"joint_contact_only": True, "joint_contact_height": 0.2, "joint_friction_coefficient": 0.12}
@@ -117,22 +117,14 @@ def example_of_checks(scene, limits):
     return checks(check(BeamSpringLining(ring).respond(pressures), limits))
 
 
-def main(folder=None, records=RECORDS):
-    """Everything, into docs/ring.md, whose example of limits is drawn."""
-    page, scene = docs_page("ring", "made", "closed form", "cost"), load_scene("case-3")
-    images = Path(folder or DOCS / "images")
-    (limits,) = re.findall(r'```toml title="limits.toml"\n(.*?)```', page.text, re.S)
+def blocks(folder=None):
+    """Everything, the example of limits being that of the page; no blocks where pictures go to a folder."""
+    scene, images = load_scene("case-3"), Path(folder or DOCS / "images")
+    (limits,) = re.findall(r'```toml title="limits.toml"\n(.*?)```', docs_page("ring").text, re.S)
     example = example_of_checks(scene, Limits.model_validate(tomllib.loads(limits)))
     example.savefig(images / "ring_checks.png", dpi=RESOLUTION)
     joint_laws(images / "joint_laws.png")
-    if folder is not None:
-        return
-    page.fill({
-        "made": made_by("uv run python -m verification.reports.ring"),
+    return {} if folder is not None else {
         "closed form": table(("elements", "N", "Q", "M", "displacement"), closed_form_errors(scene)),
-        "cost": table(("joints, ground", "CPU s", "Newton steps", "residual"), costs(scene, records)),
-    })  # fmt: skip
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:2])
+        "cost": table(("joints, ground", "CPU s", "Newton steps", "residual"), costs(scene, RECORDS)),
+    }  # fmt: skip

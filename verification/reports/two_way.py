@@ -1,9 +1,8 @@
 """Case 3 with a lining that is held, elastic or jointed in the ground, over the whole event: docs/two-way.md.
 
-uv run python -m verification.reports.two_way RUNS    # runs into the folder RUNS, or goes on with them; minutes
+uv run python -m verification.reports two-way [RUNS]    # runs into the folder RUNS, or goes on with them; minutes
 """
 
-import sys
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
@@ -16,9 +15,10 @@ from coupling.figures import GATE
 from coupling.figures.picture import legend_outside
 from coupling.postprocess import at_inflow
 from structure.response import FORCES
-from verification.pages import DOCS, docs_page, made_by, picture, table
+from verification.pages import DOCS, picture, table
 from verification.sensitivity.variants import meshes
 
+BLOCKS = ("states", "meshes")
 OPEN = {"joint_contact_only": True, "joint_contact_height": 0.35, "joint_friction_coefficient": 0.5}
 #: What the ground is computed with: changes of case 3, and whether the forces are those of the ring in soil springs
 #: under the pressures that result, or of the ring in the ground.
@@ -105,8 +105,8 @@ def draw(path, found):
         legend_outside(figure, axes[0], columns=2)
 
 
-def main(runs):
-    page = docs_page("two-way", "made", "states", "meshes")
+def blocks(runs="runs/two-way"):
+    """The tables of both meshes, and the picture."""
     names = {lining: "-".join(lining.replace(",", "").split()) for lining in LININGS}
     jobs = {(m, k): (Path(runs) / m / names[k], MESHES[m], LININGS[k][0]) for m in MESHES for k in LININGS}
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
@@ -121,9 +121,4 @@ def main(runs):
             lines += [f"**{mass:g} kg/m**", "", *table(tuple(here[0]), (tuple(row.values()) for row in here)), ""]
         if mesh == "finer":
             draw(DOCS / "images" / "two-way.png", found)
-    made = made_by("uv run python -m verification.reports.two_way RUNS")
-    page.fill({"made": made, "states": tables["finer"], "meshes": tables["coarse"]})
-
-
-if __name__ == "__main__":
-    main(sys.argv[1])
+    return {"states": tables["finer"], "meshes": tables["coarse"]}

@@ -1,31 +1,31 @@
 """What moves the inflow of case 3: numerical choices, which must not, beside properties of the ground, which must.
 
-    uv run python -m verification.sensitivity.inflow           # some ten minutes; docs/inflow-sensitivity.*
-    uv run python -m verification.sensitivity.inflow case-3    # half an hour; docs/case-3-sensitivity.*
+    uv run python -m verification.reports inflow-sensitivity    # some ten minutes
+    uv run python -m verification.reports case-3-sensitivity    # half an hour
 
 Scene `quick` until 300 kg/m, or `case-3` until 1000 kg/m, one thing changed at a time; of `case-3` also the values at
 mesh size zero with error bars. Runs are kept in studies/sensitivity and not repeated.
 """
 
-import sys
 from pathlib import Path
 
 import numpy as np
 
 import coupling
-from verification.pages import DOCS, docs_page, made_by, table, write_data
+from verification.pages import DOCS, table, write_data
 from verification.sensitivity.choices import AS_IT_IS, COARSER, PHYSICS, of_case_3, of_quick
 from verification.sensitivity.variants import at_size_zero, quantities, run_variants, value_at
 
+BLOCKS = ("numerics", "spread")
 MARKS = {"quick": (100.0, 200.0, 300.0), "case-3": (100.0, 300.0, 1000.0)}  # kg/m
 FIXED = {"output.interval": 0.005, "output.points": False, "stop.time": 30.0}
 FOLDER = Path("studies/sensitivity")
 
 
-def measured(name, variants, folder, workers=None, tell=print):
+def measured(name, variants, folder):
     """Rows of the tables: name of a quantity to (n_variants,) values, of the last mark, the times of all of them."""
     marks, scene = MARKS[name], coupling.load_scene(name)
-    data = run_variants(name, variants, marks[-1], folder, workers, tell, **FIXED)
+    data = run_variants(name, variants, marks[-1], folder, tell=print, **FIXED)
     found = [quantities(data, mark, scene.gate.angle) for mark in marks]
     times = {key: values for state in found for key, values in state.items() if key.startswith("time to")}
     seconds = data["cpu_seconds"].values
@@ -101,26 +101,19 @@ def beside_seepage(name, variants, found):
     return table(("changed", *head), rows)
 
 
-def main(name="quick", workers=None):
-    """Run the variants of a scene and fill its page."""
-    quick, scene = name == "quick", coupling.load_scene(name)
-    file, blocks = ("inflow-sensitivity", ("ground", "seepage")) if quick else ("case-3-sensitivity", ("size zero",))
-    page = docs_page(file, "made", "numerics", "spread", *blocks)
+def blocks(name, folder=FOLDER):
+    """Run the variants of a scene; besides :data:`BLOCKS` "ground" and "seepage" of `quick`, "size zero" of case 3."""
+    quick, scene, folder = name == "quick", coupling.load_scene(name), Path(folder) / name
     variants = of_quick(scene) if quick else of_case_3(scene)
-    found = measured(name, variants, FOLDER / name, workers)
-    command = "uv run python -m verification.sensitivity.inflow" + " case-3" * (not quick)
-    filled = {"made": made_by(command), "numerics": measured_table(variants, found), "spread": spread(found)}
+    found = measured(name, variants, folder)
+    filled = {"numerics": measured_table(variants, found), "spread": spread(found)}
     data = {"numerics": {"variants": list(variants)} | {key: values.tolist() for key, values in found.items()}}
     if quick:
         ground = {AS_IT_IS: {}} | PHYSICS
-        moved = measured(name, ground, FOLDER / name, workers)
+        moved = measured(name, ground, folder)
         data["physics"] = {"variants": list(ground)} | {key: values.tolist() for key, values in moved.items()}
         filled |= {"ground": measured_table(ground, moved), "seepage": beside_seepage(name, ground, moved)}
     else:
         filled["size zero"] = error_bars(variants, found)
-    page.fill(filled)
-    write_data(DOCS / f"{file}.json", data)
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:2])
+    write_data(DOCS / f"{'inflow' if quick else name}-sensitivity.json", data)
+    return filled
