@@ -76,9 +76,8 @@ def draw(problem, rows, path):
         axes.plot(*place, "o", ms=9, mfc="none", mec="black", label="default")
         logarithmic_axis(axes.xaxis)
         logarithmic_axis(axes.yaxis)
-        axes.set_xlabel("processor time of stepping [s]")
-        axes.set_ylabel(f"error: {problem.norm}" if len(problem.norm) < 40 else "error [-]")
-        axes.set_title(problem.title)
+        what = f"error: {problem.norm}" if len(problem.norm) < 40 else "error [-]"
+        axes.set(xlabel="processor time of stepping [s]", ylabel=what, title=problem.title)
         axes.grid(True)
         axes.legend(fontsize=7)
 

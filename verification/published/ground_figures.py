@@ -32,8 +32,7 @@ def settlement_troughs(settlement, masses):
             text = f"{mass:.0f} kg/m" + (f", i = {width:.1f} m" if np.isfinite(width) else "")
             axis.plot(now["x"], 1e3 * now, color=colour, label=text)
         axis.invert_yaxis()
-        axis.set_xlabel("x [m]")
-        axis.set_ylabel("settlement [mm]")
+        axis.set(xlabel="x [m]", ylabel="settlement [mm]")
         axis.grid(True)
         axis.legend(loc="best")
     return figure
@@ -51,15 +50,13 @@ def inflow_and_stages(history):
         disturbed = f"disturbed ({ZONES[1]:g} to {ZONES[0]:g} mm)"
         lower.plot(time, history["disturbed_area"], color=SECOND, ls="--", label=disturbed)
         lower.plot(nodes, stages.areas, "o-", color="0.2", lw=0.8, ms=3, label="three straight pieces")
-        lower.set_ylabel("area [m²]")
-        lower.set_xlabel("time since the gate opened [s]")
+        lower.set(xlabel="time since the gate opened [s]", ylabel="area [m²]")
         lower.legend(loc="best")
         names = ("initial", "rapid", "stable") if stages.appear else ("first piece", "second", "third")
         for axis in (upper, lower):
             for bend in stages.bends:
                 axis.axvline(bend, color="0.6", lw=0.7, ls=":")
-            axis.set_ylim(bottom=0)
-            axis.set_xlim(0, max(float(time[-1]), 1e-9))
+            axis.set(xlim=(0, max(float(time[-1]), 1e-9)), ylim=(0, None))
             axis.grid(True)
         for name, left, right in zip(names, nodes[:-1], nodes[1:], strict=True):
             upper.annotate(
@@ -164,9 +161,8 @@ def stresses_along_axes(horizontal, vertical, masses):
                 now = postprocess.at_inflow(whole, mass)[name]
                 axis.plot(place, now / 1e3, color=colour, label=f"{mass:.0f} kg/m")
             axis.axvline(0.0, color=GATE, lw=0.8, ls=":")
-            axis.set_xlim(max(-4.0, float(place.min())), min(4.0, float(place.max())))
-            axis.set_ylabel(title)
-            axis.set_xlabel(f"{data.attrs['direction']} distance from the gate over D")
+            axis.set(xlim=(max(-4.0, float(place.min())), min(4.0, float(place.max()))), ylabel=title)
+            axis.set(xlabel=f"{data.attrs['direction']} distance from the gate over D")
             axis.grid(True)
         legend_outside(figure, axes[0, 0])
     return figure

@@ -78,12 +78,9 @@ def initial_pressures(pressures, theory):
             for (name, title), colour in zip(PRESSURES.items(), ("#8a5a00", NOW), strict=True):
                 axis.plot(ours["theta"], ours[name] / 1e3, color=colour, label=f"{title}, computed")
                 axis.plot(theirs["theta"], theirs[name] / 1e3, color="k", lw=0.9, ls="--", label=f"{title}, theory")
-            axis.set_xlabel("angle from the crown, clockwise [°]")
-            axis.set_xticks(np.arange(0, 361, 90))
-            axis.set_xlim(0, 360)
-            axis.set_ylim(bottom=0)
+            axis.set(xlabel="angle from the crown, clockwise [°]", xticks=np.arange(0, 361, 90), xlim=(0, 360))
+            axis.set(ylim=(0, None), title=f"tunnel {k}" if len(tunnels) > 1 else "")
             axis.grid(True)
-            axis.set_title(f"tunnel {k}" if len(tunnels) > 1 else "")
         axes[0].set_ylabel("pressure [kPa]")
         legend_outside(figure, axes[0], columns=2)
     return figure
@@ -151,8 +148,7 @@ def _over_inflow(panels):
         for axis, (title, lines) in zip(axes, panels, strict=True):
             for label, mass, values, style in lines:
                 axis.plot(mass, values, label=label, **style)
-            axis.set_ylabel(title)
-            axis.set_xlabel("inflow mass [kg/m]")
+            axis.set(xlabel="inflow mass [kg/m]", ylabel=title)
             axis.grid(True)
         legend_outside(figure, axes[0])
     return figure

@@ -149,8 +149,7 @@ def _draw_errors(curves):
                     axis.annotate(f"{counts[k]:.0f}", (seconds[k], errors[k]), (3, 4), textcoords="offset points",
                                   fontsize=6.5, color=colours[label])  # fmt: skip
         for axis, title in zip(axes, ("bending moment", "radial displacement"), strict=True):
-            axis.set_title(f"{title}: largest error / extreme")
-            axis.set_xlabel("CPU seconds for 50 times")
+            axis.set(title=f"{title}: largest error / extreme", xlabel="CPU seconds for 50 times")
             axis.grid(True)
         legend_outside(figure, axes[0], columns=3)
 
@@ -175,11 +174,8 @@ def joint_stresses(scene):
             patches = PolyCollection(corners[nodes[:, near].T], array=values[near], cmap="RdBu_r", edgecolors="face")
             patches.set_clim(-limit, limit)
             axis.add_collection(patches)
-            axis.set_aspect("equal")
-            axis.set_xlim(middle[0] - 0.8, middle[0] + 0.6)
-            axis.set_ylim(middle[1] - 0.8, middle[1] + 0.8)
-            axis.set_title(title)
-            axis.set_xlabel("x [m]")
+            axis.set(xlim=middle[0] + [-0.8, 0.6], ylim=middle[1] + [-0.8, 0.8], aspect="equal")
+            axis.set(title=title, xlabel="x [m]")
             figure.colorbar(patches, ax=axis)
         axes[0].set_ylabel("y from the axis [m]")
 

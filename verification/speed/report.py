@@ -27,9 +27,7 @@ def draw(data, path):
         kernels.set_xlabel("CPU time of a point-step [ns]")
         costs = [1e9 / r["points_per_second"] for r in data["sizes"]]
         sizes.semilogx([r["points"] for r in data["sizes"]], costs, "o-", color=NOW)
-        sizes.set_ylim(0.0, 1.15 * max(costs))
-        sizes.set_xlabel("points")
-        sizes.set_ylabel("CPU time of a point-step [ns]")
+        sizes.set(xlabel="points", ylabel="CPU time of a point-step [ns]", ylim=(0.0, 1.15 * max(costs)))
         sizes.set_title(f"cost of a step ~ points^{data['size_slope']:.2f} (from 5000 on)")
         left = {"cold": 0.0, "warm": 0.0}
         for k, part in enumerate(name for name in data["start"]["warm"] if name != "sum"):

@@ -44,8 +44,7 @@ def _heat(axis, part, way, x, y, x_label, y_label):
     for (j, i), value in np.ndenumerate(values):
         colour = "white" if value < 0.6 else "black"
         axis.text(i, j, f"{value:.2f}", ha="center", va="center", fontsize=size, color=colour)
-    axis.set_xlabel(x_label)
-    axis.set_ylabel(y_label)
+    axis.set(xlabel=x_label, ylabel=y_label)
     return image
 
 
@@ -73,8 +72,7 @@ def _shapes(axis, part):
         axis.plot([], [], marker, ms=4, color="0.3", mfc="none", label=f"points: {place}")
     _limits(axis)
     axis.set_xticks([0, 0.3, 1, 1.3, 2, 2.3], ["0.3", "skew", "1", "skew", "3", "skew"])
-    axis.set_xlabel("width over height of a cell [-]; skew: nodes moved")
-    axis.set_ylim(0.0, 2.9)
+    axis.set(xlabel="width over height of a cell [-]; skew: nodes moved", ylim=(0.0, 2.9))
     axis.legend(loc="upper left", fontsize=5, ncols=3, columnspacing=0.8, handletextpad=0.2)
 
 
@@ -85,6 +83,5 @@ def _label(way, damped):
 def _limits(axis):
     axis.axhline(1.0, color="0.3", lw=0.8)
     axis.axhline(0.7, color="0.3", lw=0.8, ls="--")
-    axis.set_ylim(0.0, 2.1)
-    axis.set_ylabel("predicted / actual critical step [-]")
+    axis.set(ylim=(0.0, 2.1), ylabel="predicted / actual critical step [-]")
     axis.grid(True)
