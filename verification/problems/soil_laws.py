@@ -48,6 +48,20 @@ class Piece:
         self.stress, _ = self.soil.new_stress(self.stress, strain, self.point, self.constants, 1.0)
         return self.stress
 
+    def strained(self, steps, xx=0.0, yy=0.0, xy=0.0):
+        """Strain by a tensor in plane strain, in equal steps.
+
+        Returns processor time [s], and after each step p, q [Pa], specific volume [-]: (steps,), stress: (steps, 4).
+        """
+
+        def path():
+            for _ in range(steps):
+                stress = self.strain(xx / steps, yy / steps, xy / steps)
+                yield *self.invariants, 1 / (1 - self.point.porosity), stress
+
+        found, seconds = timed(lambda: list(path()))
+        return seconds, *map(np.array, zip(*found, strict=True))
+
     @property
     def invariants(self):
         """Mean pressure, from the attraction of clay, and deviatoric stress q [Pa]."""
@@ -66,15 +80,7 @@ def oedometer(steps=200, strain=0.3, **settings):
     """
     piece = Piece(**CLAY | settings)
     c, soil = piece.constants, piece.soil
-
-    def run():
-        path = []
-        for _ in range(steps):
-            piece.strain(0.0, -strain / steps, 0.0)
-            path.append((*piece.invariants, 1 / (1 - piece.point.porosity)))
-        return np.array(path)
-
-    (p, q, volume), seconds = (lambda found: (found[0].T, found[1]))(timed(run))
+    seconds, p, q, volume, _ = piece.strained(steps, yy=-strain)
     slope, kappa = c.critical_state_slope, c.swelling_index
 
     def miss(eta):
@@ -99,15 +105,7 @@ def undrained_shear(steps=100, strain=0.1, overconsolidation_ratio=1.0, **settin
     c, soil = piece.constants, piece.soil
     start, share = piece.invariants[0], 1 - c.swelling_index / soil.compression_index
     slope = c.critical_state_slope
-
-    def run():
-        path = []
-        for _ in range(steps):
-            piece.strain(0.0, 0.0, strain / steps)
-            path.append(piece.invariants)
-        return np.array(path)
-
-    (p, q), seconds = (lambda found: (found[0].T, found[1]))(timed(run))
+    seconds, p, q, _, _ = piece.strained(steps, xy=strain)
     end = slope * start * overconsolidation_ratio**share * 0.5**share
     eta_of_yield = slope * math.sqrt(overconsolidation_ratio - 1)
     yields = np.maximum.accumulate(np.abs(p / start - 1)) > 1e-12  # elastic clay keeps p: from the first change on
@@ -129,11 +127,7 @@ def softening(steps=400, strain=0.02, **settings):
         "residual_friction_angle": 0.0, "residual_dilatancy_angle": 0.0, "softening_strain": span,
     } | settings)  # fmt: skip
     shear = piece.constants.shear
-
-    def run():
-        return np.array([piece.strain(strain / steps, -strain / steps, 0.0)[:2] for _ in range(steps)])
-
-    stress, seconds = timed(run)
+    seconds, _, _, _, stress = piece.strained(steps, xx=strain, yy=-strain)
     sheared = strain * np.arange(1, steps + 1) / steps
     hardening = -2 / math.sqrt(3) * (peak - residual) / span
     beyond = np.maximum(sheared - peak / (2 * shear), 0.0)
