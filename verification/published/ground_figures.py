@@ -7,7 +7,7 @@ from matplotlib.tri import Triangulation
 
 from coupling import postprocess
 from coupling.datasets.geometry import tunnel_of
-from coupling.figures import GATE, INITIAL, NOW, SECOND
+from coupling.figures import GATE, INITIAL, SECOND, STYLE, inflow
 from coupling.figures.ground import FIELD_COLOURS, frame_view
 from coupling.figures.picture import legend_outside, styled
 from coupling.figures.tunnel import draw_linings
@@ -42,28 +42,20 @@ def inflow_and_stages(history):
     """Inflow mass and areas of both zones over time, with the three stages of the flow zone."""
     stages, time = postprocess.flow_zone_stages(history), history["time"].values
     nodes = [float(time[0]), *stages.bends, float(time[-1])]
-    with styled(5.2, 4.6) as figure:
-        upper, lower = figure.subplots(2, 1, sharex=True)
-        upper.plot(time, history["inflow_mass"], color=NOW)
-        upper.set_ylabel("inflow mass [kg/m]")
-        lower.plot(time, history["flow_zone_area"], color=GATE, label=f"flow zone (> {ZONES[0]:g} mm)")
-        disturbed = f"disturbed ({ZONES[1]:g} to {ZONES[0]:g} mm)"
-        lower.plot(time, history["disturbed_area"], color=SECOND, ls="--", label=disturbed)
+    names = ("initial", "rapid", "stable") if stages.appear else ("first piece", "second", "third")
+    figure = inflow(history)
+    with matplotlib.rc_context(STYLE):
+        upper, lower = figure.axes
         lower.plot(nodes, stages.areas, "o-", color="0.2", lw=0.8, ms=3, label="three straight pieces")
-        lower.set(xlabel="time since the gate opened [s]", ylabel="area [m²]")
         lower.legend(loc="best")
-        names = ("initial", "rapid", "stable") if stages.appear else ("first piece", "second", "third")
         for axis in (upper, lower):
             for bend in stages.bends:
                 axis.axvline(bend, color="0.6", lw=0.7, ls=":")
-            axis.set(xlim=(0, max(float(time[-1]), 1e-9)), ylim=(0, None))
-            axis.grid(True)
         for name, left, right in zip(names, nodes[:-1], nodes[1:], strict=True):
             upper.annotate(
                 name, (0.5 * (left + right), 1.0), (0, 2), xycoords=("data", "axes fraction"),
                 textcoords="offset points", ha="center", va="bottom", fontsize=7,
             )  # fmt: skip
-        figure.align_ylabels()
     return figure
 
 
