@@ -8,7 +8,6 @@ import numpy as np
 
 from coupling import postprocess
 from coupling.datasets import (
-    RunFileError,
     cell_centres,
     cell_mean_weights,
     read_attributes,
@@ -18,8 +17,10 @@ from coupling.datasets import (
     read_points,
     read_pressures,
     read_response,
+    read_run,
 )
 from coupling.datasets.geometry import on_tunnel
+from coupling.datasets.tree import model_names
 
 #: Inflow masses that the source looks at [kg/m]: 1000 is that of its comparisons, 2000 the end of its runs.
 MASSES = (250.0, 500.0, 1000.0, 2000.0)
@@ -56,13 +57,7 @@ class RunEvidence:
     @cached_property
     def responses(self):
         """Lining model to the stored response of the gate's tunnel, over time."""
-        found = {}
-        for model in ("beam-spring", "continuum"):
-            try:
-                found[model] = read_response(self.folder, model)
-            except RunFileError:
-                continue
-        return found
+        return {model: read_response(self.folder, model) for model in model_names(read_run(self.folder))}
 
     @cached_property
     def added(self):

@@ -8,7 +8,7 @@ import xarray as xr
 
 import coupling
 from coupling.refused import Refused
-from verification.pages import Page, made_by, picture, provenance, table
+from verification.pages import Page, made_by, picture, provenance, rendered
 from verification.sensitivity.variants import at_size_zero, meshes, quantities, run_variants
 
 #: Mesh sizes over that of the scene. Those of one level differ by a few per cent, which shows what the arrangement of
@@ -65,32 +65,18 @@ def write_ladder(name, factor, found, cpu_seconds, folder):
     Returns a dict: page, data : paths as text.
     """
     ladder, own = ladder_dataset(factor, found), abs(factor - 1).argmin()
-    lines = [
-        f"{made_by(f'gush accuracy --scene {name}')} Every mesh length is multiplied by a factor; states are compared",
-        "at equal inflow mass, as means over its last tenth. Meshes of nearly one size show what the arrangement of",
-        "elements alone does. Value at size zero: straight line in mesh size, least squares (stresses of linear",
-        "triangles: first order). Error bar: the larger of its distance from the finest mesh and twice the standard",
-        "error of the fit. Pressures are means over ten degrees to either side.", "",
-        *table(("mesh over the scene's", "CPU s"), zip((f"{f:.3f}" for f in factor), (f"{s:.0f}" for s in cpu_seconds),
-                                                      strict=True)),
-    ]  # fmt: skip
+    states = {}
     for mass in ladder["inflow_mass"].values:
-        state, rows = ladder.sel(inflow_mass=mass), []
-        for quantity in ladder["quantity"].values:
-            one = state.sel(quantity=quantity)
-            here, end, bar, scatter = (
-                float(v) for v in (one["value"][own], one["extrapolated"], one["error_bar"], one["scatter"])
-            )
-            rows.append((quantity, f"{here:.4g}", f"{end:.4g}", f"±{bar:.2g}", f"{scatter:.2g}", f"{here - end:+.2g}"))
-        shown = f"images/{name}-ladder-{mass:g}.png"
-        draw(state, folder / shown)
-        head = ("quantity", "the scene's mesh", "size zero", "error bar", "scatter", "scene's mesh less size zero")
-        lines += ["", f"## {mass:g} kg/m" if mass else "## Initial state", "", *table(head, rows), ""]
-        lines += [f"![{mass:g} kg/m]({shown})"]
+        state = ladder.sel(inflow_mass=mass)
+        columns = state["value"][own], state["extrapolated"], state["error_bar"], state["scatter"]
+        states[mass] = list(zip(state["quantity"].values, *(column.values for column in columns), strict=True))
+        draw(state, folder / "images" / f"{name}-ladder-{mass:g}.png")
+    meshes_run = list(zip(factor, cpu_seconds, strict=True))
+    about = {"name": name, "made": made_by(f"gush accuracy --scene {name}"), "meshes": meshes_run, "states": states}
     page = Page(folder / f"{name}-ladder.md", f"How far {name} is from a fine mesh", ["ladder"])
     made = provenance()
     ladder.attrs = {"title": f"mesh ladder of {name}", "revision": made["revision"], "created": made["date"]}
-    written = {"page": page.fill({"ladder": lines}), "data": str(folder / f"{name}-ladder.nc")}
+    written = {"page": page.fill(rendered("ladder", **about)), "data": str(folder / f"{name}-ladder.nc")}
     ladder.to_netcdf(written["data"], engine="h5netcdf")
     return written
 
