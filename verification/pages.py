@@ -20,7 +20,7 @@ from coupling.refused import Refused
 #: Docs of the working copy this code runs from; an installed program has none.
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 #: Text of a block by its name.
-MARKED = re.compile("<!-- (?P<name>.+) -->\n(?P<text>.*?)<!-- end of (?P=name) -->", re.S)
+MARKED = re.compile("<!-- (?P<name>[^\n]+) -->\n(?P<text>.*?)<!-- end of (?P=name) -->", re.S)
 TEMPLATES = jinja2.Environment(
     loader=jinja2.PackageLoader("verification"), trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
 )
@@ -40,32 +40,27 @@ class Page:
         if self.path.is_file():
             self.text = self.path.read_text(encoding="utf-8")
         else:
-            self.text = f"# {title}\n" + "".join(f"\n{_begin(name)}{_end(name)}\n" for name in blocks)
+            self.text = f"# {title}\n" + "".join(f"\n<!-- {name} -->\n<!-- end of {name} -->\n" for name in blocks)
+        marked = {found["name"] for found in MARKED.finditer(self.text)}
         for name in blocks:
-            if _begin(name) not in self.text or _end(name) not in self.text:
+            if name not in marked:
                 raise Refused(
-                    f"{self.path}: must mark the block {name!r} by '{_begin(name).strip()}' and '{_end(name)}', got "
+                    f"{self.path}: must mark the block {name!r} by '<!-- {name} -->' and '<!-- end of {name} -->', got "
                     "none; mark it, or move the page away"
                 )
 
     def fill(self, blocks):
         """Replace blocks, name to lines of text, and write the page; returns its path as text."""
-        for name, lines in blocks.items():
+
+        def filled(found):
+            name, lines = found["name"], blocks.get(found["name"], found["text"])
             text = "\n".join([lines] if isinstance(lines, str) else lines).strip("\n")
-            block = re.escape(_begin(name)) + ".*?" + re.escape(_end(name))
-            filled = _begin(name) + text + "\n" * bool(text) + _end(name)
-            self.text = re.sub(block, lambda _, filled=filled: filled, self.text, flags=re.S)
+            return f"<!-- {name} -->\n" + text + "\n" * bool(text) + f"<!-- end of {name} -->"
+
+        self.text = MARKED.sub(filled, self.text)
         self.path.parent.mkdir(parents=True, exist_ok=True)
         self.path.write_text(self.text, encoding="utf-8")
         return str(self.path)
-
-
-def _begin(name):
-    return f"<!-- {name} -->\n"
-
-
-def _end(name):
-    return f"<!-- end of {name} -->"
 
 
 def rendered(template, **numbers):

@@ -1,1 +1,1 @@
-"""Report pages of the docs that are no command of `gush`: each module measures, then writes its page."""
+"""Report pages of the docs that are no command of `gush`: each module measures the blocks of its page."""
