@@ -28,9 +28,14 @@ def pressure_ratios(cases):
     })  # fmt: skip
 
 
-def additional_force(cases, name, title):
-    """What the event adds to a force of the ring, by groups of cases (figures 20 and 21); title with the unit kN."""
-    return _rings(cases, {title: lambda run: run.added[name].values / 1e3})
+def additional_axial_force(cases):
+    """What the event adds to the axial force of the ring, by groups of cases (figure 20)."""
+    return _rings(cases, {"additional axial force [kN/m]": lambda run: run.added["axial_force"].values / 1e3})
+
+
+def additional_bending_moment(cases):
+    """What the event adds to the bending moment of the ring, by groups of cases (figure 21)."""
+    return _rings(cases, {"additional bending moment [kN m/m]": lambda run: run.added["bending_moment"].values / 1e3})
 
 
 def deformation(cases):

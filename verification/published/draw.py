@@ -2,13 +2,11 @@
 
 from pathlib import Path
 
-import numpy as np
-
-from coupling import postprocess
-from coupling.figures import GATE, NOW, RESOLUTION, deformed_ring
+from coupling.figures import GATE, NOW, RESOLUTION
 from coupling.figures.picture import styled
-from verification.published import case_figures, ground_figures, lining_figures
-from verification.published.evidence import initial_theory
+from verification.published import case_figures as cases
+from verification.published import ground_figures as ground
+from verification.published import lining_figures as lining
 
 #: Pictures that the page shows, by their numbers in the source; all others are drawn beside them.
 CAPTIONS = {
@@ -23,95 +21,58 @@ CAPTIONS = {
 }
 
 
-def draw_case(case, folder: str | Path) -> dict[str, Path]:
-    """Figures 9 to 17 of one run.
+#: Of one run, of the twin tunnels, and of all cases by scene: number of the published figure to what draws it.
+OF_CASE = {
+    "09": ground.inflow_and_stages, "10": ground.fields_around, "11": ground.stresses_along_axes,
+    "12": ground.stress_variation_fields, "13": lining.pressures_by_inflow, "14": lining.pressure_ratios_by_inflow,
+    "15": lining.forces_by_inflow, "15-ring": lining.deformation, "16": lining.extremes_over_inflow,
+    "17": lining.joints_over_inflow,
+}  # fmt: skip
+OF_TWIN = {"06": ground.settlement_troughs, "07": lining.initial_pressures}
+OF_CASES = {
+    "19": cases.pressure_ratios, "20": cases.additional_axial_force, "21": cases.additional_bending_moment,
+    "22": cases.deformation, "22-displacement": cases.displacement, "23": cases.joint_deformation,
+}  # fmt: skip
 
-    case : verification.published.evidence.RunEvidence;  folder : made when absent.
+
+def draw(figures, evidence, folder: str | Path) -> dict[str, Path]:
+    """Draw figures of evidence into a folder, which is made when absent.
+
+    figures : one of the dicts above;  evidence : what its functions take.
 
     Returns: number of the published figure to file.
     """
-    response, pressures, masses = case.responses["beam-spring"], case.of_gate, case.masses
-    fields = postprocess.with_inflow(postprocess.element_fields(case.points, case.mesh), case.history)
-    record = int(np.abs(response["inflow_mass"].values - case.compared).argmin())
-    gate, joints = float(case.scene.gate.angle), response["joint_angle"].values
-    ground, lining = ground_figures, lining_figures
-    return _saved(
-        folder,
-        {
-            "09": lambda: ground.inflow_and_stages(case.history),
-            "10": lambda: ground.fields_around(fields, case.mesh, case.compared),
-            "11": lambda: ground.stresses_along_axes(case.horizontal, case.vertical, masses),
-            "12": lambda: ground.stress_variation_fields(fields, case.mesh, masses[-2:]),
-            "13": lambda: lining.pressures_by_inflow(pressures, masses, joints),
-            "14": lambda: lining.pressure_ratios_by_inflow(pressures, masses, joints),
-            "15": lambda: lining.forces_by_inflow(response, masses, gate),
-            "15-ring": lambda: deformed_ring(response, record),
-            "16": lambda: lining.extremes_over_inflow(case.responses),
-            "17": lambda: lining.joints_over_inflow(response),
-        },
-    )
-
-
-def draw_twin(twin, folder: str | Path) -> dict[str, Path]:
-    """Figures 6 and 7 of the twin tunnels; parameters as :func:`draw_case`."""
-    theory = [initial_theory(twin.scene, tunnel) for tunnel in twin.scene.tunnels]
-    first = twin.at_rest if twin.at_rest is not None else twin.pressures
-    return _saved(
-        folder,
-        {
-            "06": lambda: ground_figures.settlement_troughs(twin.settlement, twin.masses),
-            "07": lambda: lining_figures.initial_pressures(first, theory),
-        },
-    )
-
-
-def draw_cases(cases, folder: str | Path) -> dict[str, Path]:
-    """Figures 19 to 23 of all cases at 1000 kg/m; cases: evidence by scene."""
-    one = case_figures
-    return _saved(
-        folder,
-        {
-            "19": lambda: one.pressure_ratios(cases),
-            "20": lambda: one.additional_force(cases, "axial_force", "additional axial force [kN/m]"),
-            "21": lambda: one.additional_force(cases, "bending_moment", "additional bending moment [kN m/m]"),
-            "22": lambda: one.deformation(cases),
-            "22-displacement": lambda: one.displacement(cases),
-            "23": lambda: one.joint_deformation(cases),
-        },
-    )
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    written = {}
+    for number, picture in figures.items():
+        written[number] = folder / (f"figure-{number}.png" if number[0].isdigit() else f"{number}.png")
+        picture(evidence).savefig(written[number], dpi=RESOLUTION)
+    return written
 
 
 def draw_bands(verdicts, folder: str | Path) -> dict[str, Path]:
     """Our numbers over the published ones with their bands, of the statements that are numbers of one sign."""
     shown = [v for v in verdicts.values() if v.statement.stated[0] == v.statement.stated[1] and v.agrees
              and v.found.value / v.statement.stated[0] > 0 and v.statement.text != "joints that turn most"]  # fmt: skip
-
-    def draw():
-        with styled(6.2, 0.8 + 0.2 * len(shown)) as figure:
-            axis = figure.subplots()
-            for row, v in enumerate(reversed(shown)):
-                theirs, colour = v.statement.stated[0], GATE if v.agrees == "no" else NOW
-                ends = sorted(max(end / theirs, 1e-2) for end in (v.low, v.high))
-                axis.plot(ends, [row, row], color=colour, lw=3, alpha=0.35, solid_capstyle="butt")
-                axis.plot(v.found.value / theirs, row, "o", ms=4, color=colour)
-            axis.axvline(1.0, color="0.2", lw=0.8)
-            axis.set_xscale("log")
-            axis.set_yticks(range(len(shown)), [v.statement.text for v in reversed(shown)])
-            axis.set_xlabel("ours over published; bar: band of what is not stated; red: disagrees")
-            axis.grid(True, axis="x")
-        return figure
-
-    return _saved(folder, {"bands": draw} if shown else {})
+    return draw({"bands": bands} if shown else {}, shown, folder)
 
 
-def _saved(folder, figures):
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    written = {}
-    for number, draw in figures.items():
-        written[number] = folder / (f"figure-{number}.png" if number[0].isdigit() else f"{number}.png")
-        draw().savefig(written[number], dpi=RESOLUTION)
-    return written
+def bands(shown):
+    """Figure of the bands of some verdicts."""
+    with styled(6.2, 0.8 + 0.2 * len(shown)) as figure:
+        axis = figure.subplots()
+        for row, v in enumerate(reversed(shown)):
+            theirs, colour = v.statement.stated[0], GATE if v.agrees == "no" else NOW
+            ends = sorted(max(end / theirs, 1e-2) for end in (v.low, v.high))
+            axis.plot(ends, [row, row], color=colour, lw=3, alpha=0.35, solid_capstyle="butt")
+            axis.plot(v.found.value / theirs, row, "o", ms=4, color=colour)
+        axis.axvline(1.0, color="0.2", lw=0.8)
+        axis.set_xscale("log")
+        axis.set_yticks(range(len(shown)), [v.statement.text for v in reversed(shown)])
+        axis.set_xlabel("ours over published; bar: band of what is not stated; red: disagrees")
+        axis.grid(True, axis="x")
+    return figure
 
 
 def draw_study(study: str | Path, folder: str | Path) -> dict[str, Path]:
@@ -127,9 +88,9 @@ def draw_study(study: str | Path, folder: str | Path) -> dict[str, Path]:
     runs = {run.evidence.scene.name: run.evidence for run in finished(study)}
     written = {}
     if "twin-tunnels" in runs:
-        written |= draw_twin(runs["twin-tunnels"], folder)
+        written |= draw(OF_TWIN, runs["twin-tunnels"], folder)
     if "case-3" in runs:
-        written |= draw_case(runs["case-3"], folder) | draw_cases(runs, folder)
+        written |= draw(OF_CASE, runs["case-3"], folder) | draw(OF_CASES, runs, folder)
     if not written:
         raise StudyError(f"study '{study}': must hold a finished case-3 or twin-tunnels, got neither; run gush study")
     return written

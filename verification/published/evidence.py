@@ -59,10 +59,15 @@ class RunEvidence:
         """Lining model to the stored response of the gate's tunnel, over time."""
         return {model: read_response(self.folder, model) for model in model_names(read_run(self.folder))}
 
+    @property
+    def ring(self):
+        """Response of the beam-spring ring, over time."""
+        return self.responses["beam-spring"]
+
     @cached_property
     def added(self):
         """What the event has added to the beam-spring ring at :attr:`compared`."""
-        return postprocess.additional_at_inflow(self.responses["beam-spring"], self.compared)
+        return postprocess.additional_at_inflow(self.ring, self.compared)
 
     @property
     def reached(self) -> float:
@@ -83,6 +88,11 @@ class RunEvidence:
     def points(self):
         """The first snapshot and those around every one of :attr:`masses`, with inflow_mass (time)."""
         return self._points_around((*self.masses, self.compared))
+
+    @cached_property
+    def fields(self):
+        """Means of the elements at the snapshots of :attr:`points`, with inflow_mass (time)."""
+        return postprocess.with_inflow(postprocess.element_fields(self.points, self.mesh), self.history)
 
     def _points_around(self, masses):
         points = postprocess.with_inflow(read_points(self.folder), self.history)

@@ -1,4 +1,7 @@
-"""Figures 6 and 9 to 12 of the published study: settlement, inflow and flow zone, fields and stresses in the ground."""
+"""Figures 6 and 9 to 12 of the published study: settlement, inflow and flow zone, fields and stresses in the ground.
+
+Each is drawn of a :class:`verification.published.evidence.RunEvidence`.
+"""
 
 import matplotlib
 import numpy as np
@@ -22,12 +25,12 @@ def mass_colours(count):
     return matplotlib.colormaps["Blues"](np.linspace(0.4, 1.0, count))
 
 
-def settlement_troughs(settlement, masses):
-    """Settlement of the ground surface (time, x) at some inflow masses [kg/m], with the width of each trough."""
+def settlement_troughs(run):
+    """Figure 6: settlement of the ground surface at some inflow masses, with the width of each trough."""
     with styled(5.6, 3.2) as figure:
         axis = figure.subplots()
-        for mass, colour in zip(masses, mass_colours(len(masses)), strict=True):
-            now = postprocess.at_inflow(settlement, mass)["settlement"]
+        for mass, colour in zip(run.masses, mass_colours(len(run.masses)), strict=True):
+            now = postprocess.at_inflow(run.settlement, mass)["settlement"]
             width = float(postprocess.trough(now.expand_dims("time"))["width"][0])
             text = f"{mass:.0f} kg/m" + (f", i = {width:.1f} m" if np.isfinite(width) else "")
             axis.plot(now["x"], 1e3 * now, color=colour, label=text)
@@ -38,12 +41,12 @@ def settlement_troughs(settlement, masses):
     return figure
 
 
-def inflow_and_stages(history):
-    """Inflow mass and areas of both zones over time, with the three stages of the flow zone."""
-    stages, time = postprocess.flow_zone_stages(history), history["time"].values
+def inflow_and_stages(run):
+    """Figure 9: inflow mass and areas of both zones over time, with the three stages of the flow zone."""
+    stages, time = postprocess.flow_zone_stages(run.history), run.history["time"].values
     nodes = [float(time[0]), *stages.bends, float(time[-1])]
     names = ("initial", "rapid", "stable") if stages.appear else ("first piece", "second", "third")
-    figure = inflow(history)
+    figure = inflow(run.history)
     with matplotlib.rc_context(STYLE):
         upper, lower = figure.axes
         lower.plot(nodes, stages.areas, "o-", color="0.2", lw=0.8, ms=3, label="three straight pieces")
@@ -59,13 +62,9 @@ def inflow_and_stages(history):
     return figure
 
 
-def fields_around(fields, mesh, mass):
-    """Displacement with the edges of both zones, deviatoric strain, pore pressure, vertical stress at an inflow mass.
-
-    fields : xarray.Dataset, of :func:`coupling.postprocess.element_fields`, with inflow_mass (time);
-    mesh : xarray.Dataset;  mass : float [kg/m].
-    """
-    now = postprocess.at_inflow(fields, mass)
+def fields_around(run):
+    """Figure 10: displacement with the edges of both zones, deviatoric strain, pore pressure, vertical stress."""
+    now = postprocess.at_inflow(run.fields, run.compared)
     panels = (
         ("displacement [mm]", 1e3 * now["displacement"].values, LogNorm(1.0, 1000.0), "both"),
         ("deviatoric strain [-]", now["deviatoric_strain"].values, LogNorm(1e-3, 1.0), "both"),
@@ -75,7 +74,7 @@ def fields_around(fields, mesh, mass):
     with styled(7.2, 6.4) as figure:
         axes = figure.subplots(2, 2, sharex=True, sharey=True)
         for axis, (title, values, norm, extend), colours in zip(axes.flat, panels, FIELD_COLOURS, strict=True):
-            drawn, triangles, nodal = _draw_field(axis, mesh, values, colours, norm)
+            drawn, triangles, nodal = _draw_field(axis, run.mesh, values, colours, norm)
             if title.startswith("displacement"):
                 lines = axis.tricontour(triangles, nodal, levels=sorted(ZONES), colors=[SECOND, GATE], linewidths=1.0)
                 axis.clabel(lines, fmt="%g mm", fontsize=6.5)
@@ -83,19 +82,20 @@ def fields_around(fields, mesh, mass):
             bar.outline.set_linewidth(0.5)
             axis.set_title(title)
         _label(axes)
-        figure.suptitle(f"{mass:.0f} kg/m", fontsize=9)
+        figure.suptitle(f"{run.compared:.0f} kg/m", fontsize=9)
     return figure
 
 
-def stress_variation_fields(fields, mesh, masses, name="soil_stress_vertical"):
-    """R_sigma (Eq. 10) of a stress around the tunnel at some inflow masses [kg/m]; as :func:`fields_around`."""
+def stress_variation_fields(run):
+    """Figure 12: R_sigma (Eq. 10) of the vertical stress around the tunnel at the last inflow masses."""
+    name, masses, fields = "soil_stress_vertical", run.masses[-2:], run.fields
     initial = fields[name].isel(time=0, drop=True)
     with styled(3.4 * len(masses) + 0.6, 3.5) as figure:
         axes = np.atleast_2d(figure.subplots(1, len(masses), sharey=True))
         for axis, mass in zip(axes[0], masses, strict=True):
             now = postprocess.at_inflow(fields[[name, "inflow_mass"]], mass)[name]
             ratio = postprocess.stress_variation(now, initial).values
-            drawn, *_ = _draw_field(axis, mesh, ratio, "RdBu_r", TwoSlopeNorm(0.0, -1.0, 1.0))
+            drawn, *_ = _draw_field(axis, run.mesh, ratio, "RdBu_r", TwoSlopeNorm(0.0, -1.0, 1.0))
             axis.set_title(f"{mass:.0f} kg/m")
         _label(axes)
         bar = figure.colorbar(drawn, ax=list(axes[0]), extend="max", shrink=0.9, pad=0.02)
@@ -127,19 +127,15 @@ def _draw_field(axis, mesh, values, colours, norm):
     return drawn, triangles, nodal
 
 
-def stresses_along_axes(horizontal, vertical, masses):
-    """Soil stress across, and pore pressure along, both axes through the gate at some inflow masses.
-
-    horizontal, vertical : xarray.Dataset, of :func:`coupling.postprocess.profile`, with inflow_mass (time);
-    masses : sequence of float [kg/m].
-    """
+def stresses_along_axes(run):
+    """Figure 11: soil stress across, and pore pressure along, both axes through the gate at some inflow masses."""
     panels = (
-        (horizontal, "soil_stress_vertical", "vertical effective stress [kPa]"),
-        (horizontal, "pore_pressure", "pore pressure [kPa]"),
-        (vertical, "soil_stress_horizontal", "horizontal effective stress [kPa]"),
-        (vertical, "pore_pressure", "pore pressure [kPa]"),
+        (run.horizontal, "soil_stress_vertical", "vertical effective stress [kPa]"),
+        (run.horizontal, "pore_pressure", "pore pressure [kPa]"),
+        (run.vertical, "soil_stress_horizontal", "horizontal effective stress [kPa]"),
+        (run.vertical, "pore_pressure", "pore pressure [kPa]"),
     )
-    diameter = postprocess.gate_diameter(horizontal)
+    diameter = postprocess.gate_diameter(run.horizontal)
     with styled(7.2, 5.4) as figure:
         axes = figure.subplots(2, 2)
         for axis, (data, name, title) in zip(axes.flat, panels, strict=True):
@@ -149,7 +145,7 @@ def stresses_along_axes(horizontal, vertical, masses):
             whole = data[[name, "inflow_mass"]].reindex(distance=np.sort(np.append(known, breaks)))
             place = whole["distance"] / diameter
             axis.plot(place, whole[name].isel(time=0) / 1e3, color=INITIAL, ls=(0, (4, 2)), lw=1.1, label="initial")
-            for mass, colour in zip(masses, mass_colours(len(masses)), strict=True):
+            for mass, colour in zip(run.masses, mass_colours(len(run.masses)), strict=True):
                 now = postprocess.at_inflow(whole, mass)[name]
                 axis.plot(place, now / 1e3, color=colour, label=f"{mass:.0f} kg/m")
             axis.axvline(0.0, color=GATE, lw=0.8, ls=":")

@@ -1,13 +1,17 @@
-"""Figures 7 and 13 to 17 of the published study: pressures on the lining and what the ring answers, over the event."""
+"""Figures 7 and 13 to 17 of the published study: pressures on the lining and what the ring answers, over the event.
+
+Each is drawn of a :class:`verification.published.evidence.RunEvidence`.
+"""
 
 import numpy as np
 
 from coupling import postprocess
 from coupling.datasets.geometry import gate_of
-from coupling.figures import GATE, INITIAL, NOW
+from coupling.figures import GATE, INITIAL, NOW, deformed_ring
 from coupling.figures.picture import legend_outside, styled
 from coupling.figures.polar import around_zero, closed_curve, crown_up, radial_ticks
 from structure.response import FORCES, SHOWN
+from verification.published.evidence import initial_theory
 from verification.published.ground_figures import mass_colours
 
 PRESSURES = {"soil_pressure": "soil pressure", "water_pressure": "water pressure"}
@@ -68,9 +72,10 @@ def _states(dataset, masses):
                      for m, c in zip(masses, colours, strict=True)]  # fmt: skip
 
 
-def initial_pressures(pressures, theory):
-    """Initial soil and water pressure on every tunnel's lining (theta) against the theoretical ones, one a tunnel."""
-    first = pressures.isel(time=0)
+def initial_pressures(run):
+    """Figure 7: initial soil and water pressure on every tunnel's lining against the theoretical ones."""
+    first = (run.at_rest if run.at_rest is not None else run.pressures).isel(time=0)
+    theory = [initial_theory(run.scene, tunnel) for tunnel in run.scene.tunnels]
     tunnels = [first] if "tunnel" not in first.dims else [first.isel(tunnel=k) for k in range(first.sizes["tunnel"])]
     with styled(3.5 * len(tunnels), 3.2) as figure:
         axes = np.atleast_1d(figure.subplots(1, len(tunnels), sharey=True))
@@ -86,44 +91,49 @@ def initial_pressures(pressures, theory):
     return figure
 
 
-def pressures_by_inflow(pressures, masses, joints=()):
-    """Soil and water pressure around the lining, initial and at some inflow masses [kg/m]."""
-    states = _states(pressures, masses)
+def pressures_by_inflow(run):
+    """Figure 13: soil and water pressure around the lining, initial and at some inflow masses."""
+    states = _states(run.of_gate, run.masses)
     panels = [
         (f"{title} [kPa]", [(label, state[name].values / 1e3, style) for label, state, style in states])
         for name, title in PRESSURES.items()
     ]
-    return rings(panels, 2, gate_of(pressures).angle, joints)
+    return rings(panels, 2, gate_of(run.of_gate).angle, run.ring["joint_angle"].values)
 
 
-def pressure_ratios_by_inflow(pressures, masses, joints=()):
-    """Soil and water pressure over the initial one at some inflow masses; as :func:`pressures_by_inflow`."""
-    states = _states(pressures, masses)
+def pressure_ratios_by_inflow(run):
+    """Figure 14: soil and water pressure over the initial one at some inflow masses."""
+    states = _states(run.of_gate, run.masses)
     panels = [
         (f"{title} over the initial one [-]",
          [(label, state[name].values / states[0][1][name].values, style) for label, state, style in states])
         for name, title in PRESSURES.items()
     ]  # fmt: skip
-    return rings(panels, 2, gate_of(pressures).angle, joints)
+    return rings(panels, 2, gate_of(run.of_gate).angle, run.ring["joint_angle"].values)
 
 
-def forces_by_inflow(response, masses, gate):
-    """N, Q and M around the ring, initial and at some inflow masses [kg/m]; gate: its angle [degree]."""
+def forces_by_inflow(run):
+    """Figure 15: N, Q and M around the ring, initial and at some inflow masses."""
+    states = _states(run.ring, run.masses)
     panels = [
-        (SHOWN[name].label,
-         [(label, SHOWN[name].scale * state[name].values, style) for label, state, style in _states(response, masses)])
+        (SHOWN[name].label, [(label, SHOWN[name].scale * state[name].values, style) for label, state, style in states])
         for name in FORCES
-    ]  # fmt: skip
-    return rings(panels, 3, gate, response["joint_angle"].values)
+    ]
+    return rings(panels, 3, run.scene.gate.angle, run.ring["joint_angle"].values)
 
 
-def extremes_over_inflow(responses):
-    """Largest and smallest N, Q and M over inflow mass, one line style a lining model (name to response)."""
+def deformation(run):
+    """Figure 15, second part: the deformed ring."""
+    return deformed_ring(run.ring, int(np.abs(run.ring["inflow_mass"].values - run.compared).argmin()))
+
+
+def extremes_over_inflow(run):
+    """Figure 16: largest and smallest N, Q and M over inflow mass, one line style a lining model."""
     styles = {"_max": ("largest", NOW), "_min": ("smallest", "#c1272d")}
     curves = []
     for name in FORCES:
         lines = []
-        for (model, response), dashes in zip(responses.items(), ("-", "--", ":", "-."), strict=False):
+        for (model, response), dashes in zip(run.responses.items(), ("-", "--", ":", "-."), strict=False):
             found = postprocess.extremes(response)
             lines += [(f"{word}, {model}", response["inflow_mass"], found[name + end] * SHOWN[name].scale,
                        {"color": colour, "ls": dashes}) for end, (word, colour) in styles.items()]  # fmt: skip
@@ -131,9 +141,9 @@ def extremes_over_inflow(responses):
     return _over_inflow(curves)
 
 
-def joints_over_inflow(response):
-    """Opening, dislocation and rotation of every joint over inflow mass, response of one lining model."""
-    mass = response["inflow_mass"]
+def joints_over_inflow(run):
+    """Figure 17: opening, dislocation and rotation of every joint over inflow mass."""
+    response, mass = run.ring, run.ring["inflow_mass"]
     return _over_inflow([
         (title, [(f"joint {joint}", mass, scale * response[name].sel(joint=joint), {"color": f"C{k}"})
                  for k, joint in enumerate(response["joint"].values)])

@@ -11,7 +11,7 @@ from coupling import postprocess
 from coupling.refused import SceneError
 from verification.pages import TEMPLATES, table_text
 from verification.published.bands import judged
-from verification.published.draw import CAPTIONS, draw_bands, draw_case, draw_cases, draw_twin
+from verification.published.draw import CAPTIONS, OF_CASE, OF_CASES, OF_TWIN, draw, draw_bands
 from verification.published.evidence import RunEvidence, at_rest, provenance
 from verification.published.linings import one_layer
 from verification.published.rates import independent_rates
@@ -53,11 +53,11 @@ def write_page(folder: str | Path, out: str | Path) -> dict:
         measure = partial(measured_twin, masses=twin.masses)
         changed = moved_by(finished(folder / "twin-unknowns"), measure)
         verdicts |= _verdicts(("twin",), meshes.get("twin-tunnels", {1.0: twin}), measure, changed, twin)
-        figures = draw_twin(twin, images)
+        figures = draw(OF_TWIN, twin, images)
     else:
         figures = {}
     cases = {name: run for name, run in runs.items() if name != "twin-tunnels"}
-    figures |= draw_bands(verdicts, images) | draw_case(case, images) | draw_cases(cases, images)
+    figures |= draw_bands(verdicts, images) | draw(OF_CASE, case, images) | draw(OF_CASES, cases, images)
     missing = [f"case {k}" for k in range(1, 11) if f"case-{k}" not in runs] + ["twin tunnels"] * (twin is None)
     missing += [name for name in ("meshes", "unknowns", "twin-unknowns") if not finished(folder / name)]
     shown = {number: path.relative_to(out).as_posix() for number, path in figures.items()}
@@ -195,7 +195,7 @@ def _meshes(meshes):
         for size, run in sorted(sizes.items()):
             time = float(postprocess.at_inflow(run.history, mass)["time"])
             down = 1e3 * run.settled(mass)
-            cells = [f"{value:.0f}" for value in _extremes(run.responses["beam-spring"], mass)]
+            cells = [f"{value:.0f}" for value in _extremes(run.ring, mass)]
             yield name, f"{size:.2g} times", f"{mass:.0f}", f"{time:.3f}", *cells, f"{down:.1f}"
 
 
