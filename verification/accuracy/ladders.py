@@ -4,21 +4,16 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import asdict
 
+from mpm.scene import Numerics
 from verification.accuracy.orders import excess_over_front, observed_order, pareto_front
 from verification.problems.problem import Problem, Result
 
 #: Settings that count something: their mesh size or time step is one over the value.
-COUNTS = (
-    "cells", "elements", "columns", "rows", "across", "around", "steps", "increments", "points_per_element", "points",
-)  # fmt: skip
+COUNTS = ("cells", "sectors", "around", "steps", "increments", "points")
 #: Settings that are a mesh size or a time step.
-SIZES = ("size", "element_size", "spacing", "courant", "dt", "time_step")
-#: Settings of verification problems that pose another problem.
-POSED = (
-    "aspect", "bonded", "conductivity", "cover", "duration", "friction", "height", "inertia", "mode", "periods",
-    "release", "repose", "rotational_stiffness", "rough", "rough_base", "settlement", "share", "slope", "stiffness",
-    "strain", "time_factor", "times", "turn",
-)  # fmt: skip
+SIZES = ("size", "courant")
+#: All numerical choices, K_w among them, which is a property too; what else a ladder changes poses another problem.
+NUMERICAL = {*COUNTS, *SIZES, *Numerics.model_fields, "damping", "outer", "bulk_modulus"}
 #: Errors at or below this are round-off: nothing can be gained there.
 ROUND_OFF = 1e-12
 
@@ -67,8 +62,8 @@ def assess(rows: Iterable[dict]) -> dict:
     of the default over the best error of what costs no more, 1 where it is round-off.
     """
     rows = list(rows)
-    physical = physical_settings()
-    known = [k for k, row in enumerate(rows) if math.isfinite(row["error"]) and row["setting"] not in physical]
+    chosen = NUMERICAL | {"default"}
+    known = [k for k, row in enumerate(rows) if math.isfinite(row["error"]) and row["setting"] in chosen]
     costs, errors = ([rows[k][key] for k in known] for key in ("cpu_seconds", "error"))
     front = [False] * len(rows)
     for k, best in zip(known, pareto_front(costs, errors), strict=True):
@@ -85,15 +80,6 @@ def assess(rows: Iterable[dict]) -> dict:
     if first is not None and errors[first] <= ROUND_OFF:
         excess = 1.0
     return {"orders": orders, "front": front, "excess": excess}
-
-
-def physical_settings() -> set[str]:
-    """Names of settings that pose another problem and are no numerical choice; K_w is both and stays out."""
-    from mpm.laws.law import built_in_laws
-    from mpm.scene import Water
-
-    of_soils = {name for law in built_in_laws() for name in law.model_fields}
-    return {*of_soils, *Water.model_fields, *POSED} - {"bulk_modulus"}
 
 
 def dataset(rows: Iterable[dict]):
