@@ -19,6 +19,10 @@ from verification.problems.exact_two_phase import (
 from verification.problems.problem import NUMERICS, WET, Problem, Result, register
 
 DRAINAGE = ("two-phase", "undrained")
+GROUND = {
+    "model": "elastic", "youngs_modulus": 4e7, "poissons_ratio": NU, "cohesion": 1e5, "porosity": POROSITY,
+    "loose_porosity": 0.6,
+}  # fmt: skip
 
 
 def column(cells, height, conductivity, bulk_modulus, **settings):
@@ -27,11 +31,8 @@ def column(cells, height, conductivity, bulk_modulus, **settings):
     `cells` elements over `height` [m]; the ground water stands at the top; elastic, unless `settings` say otherwise.
     """
     size = height / cells
-    ground = {
-        "model": "elastic", "youngs_modulus": 4e7, "poissons_ratio": NU, "cohesion": 1e5, "porosity": POROSITY,
-        "loose_porosity": 0.6, "hydraulic_conductivity": conductivity, "bulk_modulus": bulk_modulus,
-    }  # fmt: skip
-    scene = box_scene("column", size, 2 * size, height, **ground | settings)
+    wet = {"hydraulic_conductivity": conductivity, "bulk_modulus": bulk_modulus}
+    scene = box_scene("column", size, 2 * size, height, **GROUND | wet | settings)
     return scene, box_mesh(np.array([-size, 0.0, size]), (np.arange(cells + 2) - cells) * size)
 
 
@@ -70,12 +71,9 @@ def seepage(cells=10, conductivity=1e-3, upward=True, **numerics):
     and a pressure that falls along a straight line.
     """
     excess, size = 2e3, 1.0 / cells
-    ground = {
-        "model": "elastic", "youngs_modulus": 4e7, "poissons_ratio": NU, "cohesion": 1e5, "porosity": POROSITY,
-        "loose_porosity": 0.6, "hydraulic_conductivity": conductivity, "bulk_modulus": 8e7, "sides": "held",
-    }  # fmt: skip
+    wet = {"hydraulic_conductivity": conductivity, "bulk_modulus": 8e7, "sides": "held"}
     width, depth = (2 * size, 1.0) if upward else (1.0, 2 * size)
-    scene = box_scene("seepage", size, width, depth, **ground | numerics)
+    scene = box_scene("seepage", size, width, depth, **GROUND | wet | numerics)
     x = np.linspace(-width / 2, width / 2, round(width / size) + 1)
     y = np.linspace(-depth, 0.0, round(depth / size) + 1)
     solver = Solver(scene, box_mesh(x, np.append(y, size) if upward else y), threads=1)

@@ -4,7 +4,7 @@ Slow and plain: the yield planes are listed one by one, whichever principal stre
 integrated from event to event in rate form; nothing of the return mapping of `mpm` is used.
 """
 
-from itertools import combinations
+from itertools import combinations, permutations
 
 import numpy as np
 
@@ -25,21 +25,12 @@ def yield_planes(cohesion, friction_angle, dilatancy_angle, tensile_strength):
     same form in psi; three cap one of them at the tensile strength with associated flow (Rankine).
     """
     phi, psi = np.radians(friction_angle), np.radians(dilatancy_angle)
-    normals, flows, offsets = [], [], []
-    for i in range(3):
-        for j in range(3):
-            if i != j:
-                n, m = np.zeros(3), np.zeros(3)
-                n[i], n[j] = 1 + np.sin(phi), -(1 - np.sin(phi))
-                m[i], m[j] = 1 + np.sin(psi), -(1 - np.sin(psi))
-                normals.append(n)
-                flows.append(m)
-                offsets.append(2 * cohesion * np.cos(phi))
-    for i in range(3):
-        normals.append(np.eye(3)[i])
-        flows.append(np.eye(3)[i])
-        offsets.append(tensile_strength)
-    return np.array(normals), np.array(flows), np.array(offsets)
+    normals, flows = np.zeros((2, 9, 3))
+    for row, (i, j) in enumerate(permutations(range(3), 2)):
+        for planes, sine in ((normals, np.sin(phi)), (flows, np.sin(psi))):
+            planes[row, i], planes[row, j] = 1 + sine, -(1 - sine)
+    normals[6:] = flows[6:] = np.eye(3)
+    return normals, flows, np.array([2 * cohesion * np.cos(phi)] * 6 + [tensile_strength] * 3)
 
 
 def stress_rate(strain_rate, active, elastic, normals, flows):

@@ -30,6 +30,7 @@ LININGS = {
 }
 MESHES = {"finer": 1.0, "coarse": 1.4}  # times the sizes of case 3
 MASSES = (0.0, 100.0, 300.0, 1000.0)  # kg/m
+ENDS = (MASSES[0], MASSES[-1])
 COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7")
 
 
@@ -91,13 +92,13 @@ def draw(path, found):
     with picture(path, 9.0, 3.6) as figure:
         axes = figure.subplots(1, 3, sharey=True, width_ratios=(1, 1, 1))
         for (name, (_, ring)), colour in zip(found.items(), COLOURS, strict=True):
-            for ax, mass in zip(axes, (MASSES[0], MASSES[-1]), strict=False):
+            for ax, mass in zip(axes, ENDS, strict=False):
                 moment = at_inflow(ring, mass).bending_moment / 1e3
                 ax.plot(moment.theta, moment, color=colour, label=name)
             for extreme in ("max", "min"):
                 line = getattr(ring.bending_moment, extreme)("theta") / 1e3
                 axes[2].plot(ring.inflow_mass, line, color=colour)
-        for ax, mass in zip(axes, (MASSES[0], MASSES[-1]), strict=False):
+        for ax, mass in zip(axes, ENDS, strict=False):
             ax.set(title=f"{mass:g} kg/m", xlabel="angle from the crown [°]", xticks=range(0, 361, 90))
             ax.axvline(90.0, color=GATE, lw=1, ls=":")
         axes[0].set_ylabel("bending moment [kN m/m]")
