@@ -90,7 +90,9 @@ def stability_command(
         with ProgressLine() as line:
             data = stability(case or [], linear, out, Console(stderr=True).print, line.say)
         if answer(data):
-            _show(rendered("stability", **data))
+            _show(rendered("stability", **data | {"extremes": []}))
+            rows = ((one["name"], one["verdict"], f"{one['seconds']:.1f}", one["reason"]) for one in data["extremes"])
+            Console().print(table(("case", "verdict", "s", "reason"), rows))
             _say_all(data["files"])
     if data["faults"]:
         complain("\n".join(data["faults"]), FAILED)
@@ -148,9 +150,10 @@ def figures_command(
 
 
 def _show(blocks):
-    """Blocks of a page, in the terminal."""
+    """Blocks of a page, in the terminal; in a file as wide as their tables are."""
+    console = Console() if Console().is_terminal else Console(width=120)
     for text in blocks.values():
-        Console().print(Markdown(text))
+        console.print(Markdown(text))
 
 
 def _say_all(lines):
