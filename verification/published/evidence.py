@@ -16,11 +16,10 @@ from coupling.datasets import (
     read_mesh,
     read_points,
     read_pressures,
-    read_response,
     read_run,
 )
 from coupling.datasets.geometry import on_tunnel
-from coupling.datasets.tree import model_names
+from coupling.datasets.tree import responses_of
 
 #: Inflow masses that the source looks at [kg/m]: 1000 is that of its comparisons, 2000 the end of its runs.
 MASSES = (250.0, 500.0, 1000.0, 2000.0)
@@ -57,7 +56,7 @@ class RunEvidence:
     @cached_property
     def responses(self):
         """Lining model to the stored response of the gate's tunnel, over time."""
-        return {model: read_response(self.folder, model) for model in model_names(read_run(self.folder))}
+        return responses_of(read_run(self.folder))
 
     @property
     def ring(self):
