@@ -8,6 +8,7 @@ module.
 
 import argparse
 from importlib import import_module
+from inspect import signature
 
 from verification.pages import docs_page, made_by
 
@@ -28,6 +29,8 @@ def main():
     options = parser.parse_args()
     module, *scene = REPORTS[options.page]
     report = import_module(f"verification.{module}")
+    if options.folder and len(signature(report.blocks).parameters) == len(scene):
+        parser.error(f"{options.page}: takes no folder, got {options.folder!r}; leave it out")
     page = docs_page(options.page, "made", *report.BLOCKS)
     filled = report.blocks(*scene, *([options.folder] if options.folder else ()))
     if filled:
