@@ -11,7 +11,7 @@ import xarray as xr
 import coupling
 import mpm
 import structure
-from coupling.datasets import cell_centres, cell_mean_weights
+from coupling.datasets import MOTION, RING_FORCES, cell_centres, cell_mean_weights
 from coupling.files.provenance import root_attributes
 from structure.response import FORCES, PRESSURES
 from verification.loads import theory_pressures
@@ -29,9 +29,10 @@ ROUNDS, SECONDS = 3, 1.5
 
 
 def on_grid(part):
-    """A lining's nodal values as cell means of one degree: dict of (360,) arrays."""
+    """A lining's nodal pressures as cell means of one degree, with its motion and forces: dict of (360,) arrays."""
     weights = cell_mean_weights(part["theta"])
-    return {name: weights @ part[name] for name in part if name not in ("theta", "arc") and name[:6] != "joint_"}
+    moved = {name: part[name] for name in part.keys() & {*MOTION, *RING_FORCES}}
+    return {name: weights @ part[name] for name in PRESSURES} | moved
 
 
 def as_pressures(values):
