@@ -14,8 +14,8 @@ from typing import Annotated, Any, Literal, Union
 
 from pydantic import Field, SerializeAsAny, WrapValidator, model_validator
 
+from mpm.k0_procedure import check_k0, initial_stress
 from mpm.laws.law import built_in_laws, soil_of_its_law
-from mpm.laws.soil import Soil
 from mpm.quantities import Acceleration, Angle, Density, Length, Mass, Part, Pressure, Time, in_unit
 from mpm.walls.sides import SIDES
 
@@ -23,8 +23,6 @@ MOST_RECORDS = 1_000_000
 #: Growth of the element size per metre above which neighbouring quadrilaterals are no longer near squares.
 STEEPEST = 0.25
 _HOUR = 3600.0
-#: Share of k0 that its bounds give, so that 1 - sin(phi) over 1 + sin(phi) itself is borne.
-ROUNDING = 1e-9
 #: Smallest (outer - inner) / outer diameter: the channel through a thinner lining has no length to mesh.
 MOST_SLENDER = 0.01
 
@@ -299,7 +297,7 @@ class Scene(Part):
                 f"soils: top_depth {tops[-1]:g} m must lie in the box of depth {self.box.depth:g} m; leave "
                 "the layer out, or deepen the box"
             )
-        self._check_k0()
+        check_k0(self)
         if self.is_two_phase:
             unknown = [soil.name for soil in self.soils if soil.hydraulic_conductivity is None]
             if unknown:
@@ -374,69 +372,8 @@ class Scene(Part):
             )
 
     def vertical_stress(self, depth: float) -> float:
-        """Vertical effective stress of the level ground at a depth [m], compression positive [Pa].
-
-        The weight of the column above less the water pressure. The soil is saturated throughout: above the water table
-        its water hangs at zero pressure; without water it is dry.
-        """
-        water_density = self.water.density if self.water is not None else 0.0
-        vertical = 0.0
-        for soil, bottom in zip(self.soils, self._bottoms, strict=True):
-            density = (1 - soil.porosity) * soil.grain_density + soil.porosity * water_density
-            vertical += density * self.gravity * max(0.0, min(depth, bottom) - soil.top_depth)
-        table_depth = self.water.table_depth if self.water is not None else 0.0
-        return vertical - water_density * self.gravity * max(0.0, depth - table_depth)
-
-    @property
-    def _bottoms(self):
-        return [soil.top_depth for soil in self.soils[1:]] + [self.box.depth]
-
-    def _turning_depths(self, soil, top, bottom):
-        """Depths [m] between which the vertical effective stress in a soil's layer is linear, within two depths."""
-        top, bottom = max(top, soil.top_depth), min(bottom, self._bottoms[self.soils.index(soil)])
-        table = top if self.water is None else min(max(self.water.table_depth, top), bottom)
-        return top, table, bottom
-
-    def yield_depth(self, soil: Soil, k0: float) -> float | None:
-        """Depth from which a soil's layer yields under a K0 [m]; None where it bears it throughout."""
-        depths = self._turning_depths(soil, 0.0, math.inf)
-
-        def borne(depth):
-            lowest, highest = soil.admissible_k0(self.vertical_stress(depth))
-            return lowest * (1 - ROUNDING) <= k0 <= highest * (1 + ROUNDING)
-
-        # what cohesion adds fades with the stress, which is linear between these depths
-        shallow, deep = soil.top_depth, max(depths, key=self.vertical_stress)
-        if borne(deep):
-            return None
-        while deep - shallow > 0.01:
-            middle = (shallow + deep) / 2
-            shallow, deep = (middle, deep) if borne(middle) else (shallow, middle)
-        return shallow
-
-    def lateral_pressure_range(self, soil: Soil, top: float = 0.0, bottom: float = math.inf) -> tuple[float, float]:
-        """Lowest and highest K0 [-] of the initial state in a soil's layer, between two depths [m]."""
-        found = [
-            soil.lateral_pressure_coefficient(self.vertical_stress(depth))
-            for depth in self._turning_depths(soil, top, bottom)
-        ]
-        return min(found), max(found)
-
-    def _check_k0(self):
-        """Refuse a k0 that the soil does not bear in all of its layer: it would yield before the gate opens."""
-        for soil in self.soils:
-            yielding = None if soil.k0 is None else self.yield_depth(soil, soil.k0)
-            if yielding is None:
-                continue
-            depth = max(self._turning_depths(soil, 0.0, math.inf), key=self.vertical_stress)
-            lowest, highest = soil.admissible_k0(self.vertical_stress(depth))
-            at_rest = 1 - math.sin(math.radians(soil.strength[1]))
-            raise ValueError(
-                f"soil '{soil.name}': k0 must lie in {max(lowest, 0):.3f} .. {highest:.3f}, what {soil.limits} bear at "
-                f"{depth:g} m, got {soil.k0:g}, which yields from a depth of {yielding:.3g} m; give more strength, or "
-                f"a k0 that it bears: 1 - sin(friction_angle) = {at_rest:.3g} where the ground was never loaded more, "
-                "or leave k0 out: gravity loading within the strength"
-            )
+        """Vertical effective stress of the level ground at a depth [m], compression positive [Pa]."""
+        return float(initial_stress(self, depth)[0])
 
     @property
     def asymmetry(self) -> str | None:
@@ -472,21 +409,6 @@ class Scene(Part):
     def lining_of(self, tunnel: Tunnel) -> str:
         """How a tunnel's lining stands in the ground: its own choice, else that of the scene."""
         return tunnel.lining or self.lining
-
-    def bond_friction(self, tunnel: Tunnel) -> float:
-        """Friction coefficient that bears the K0 stress on a bonded, held lining [-].
-
-        The largest shear over pressure at a circle, where tan(theta)^2 = 1 / K0: |1 - K0| / (2 sqrt(K0)). Infinite
-        where nothing presses from the side.
-        """
-        crown, invert = tunnel.cover, tunnel.cover + tunnel.outer_diameter
-        beside = [
-            k0
-            for soil, bottom in zip(self.soils, self._bottoms, strict=True)
-            if soil.top_depth < invert and bottom > crown
-            for k0 in self.lateral_pressure_range(soil, crown, invert)
-        ]
-        return max(abs(1 - k0) / (2 * math.sqrt(k0)) if k0 > 0 else math.inf for k0 in beside)
 
     def jointed_ring(self, tunnel: Tunnel) -> Any:
         """The ring that moves as a jointed lining, as of :class:`mpm.walls.rings.LiningRing`; scenes with a ring know.

@@ -7,6 +7,7 @@ from coupling.datasets.geometry import tunnels_beside
 from coupling.datasets.tree import responses_of
 from coupling.postprocess.quality import ERRORS, STATES, poor_errors
 from mpm.fields import CLAMPS
+from mpm.k0_procedure import bond_friction, lateral_pressure_range
 from structure import theoretical_pressures
 
 #: What it means that points meet a limit, by its name in :data:`mpm.fields.CLAMPS`.
@@ -35,7 +36,7 @@ def initial_theory(scene, theta):
     soil, tunnel = scene.soils[0], scene.tunnels[0]
     if scene.water is not None and scene.water.table_depth > 0:
         return None
-    least, largest = scene.lateral_pressure_range(soil, tunnel.cover, tunnel.cover + tunnel.outer_diameter)
+    least, largest = lateral_pressure_range(scene, soil, tunnel.cover, tunnel.cover + tunnel.outer_diameter)
     if least < largest:
         return None
     density = 0.0 if scene.water is None else scene.water.density
@@ -52,7 +53,7 @@ def initial_theory(scene, theta):
 def ground_slips(scene):
     """Whether friction does not bear the shear of the theoretical state on the first lining: soil pressure differs."""
     tunnel = scene.tunnels[0]
-    return scene.bond_friction(tunnel) > tunnel.friction_coefficient
+    return bond_friction(scene, tunnel) > tunnel.friction_coefficient
 
 
 def quality(run, summary, scene=None):

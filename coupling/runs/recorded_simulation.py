@@ -18,6 +18,7 @@ from coupling.files.replace import replace_file
 from coupling.postprocess.quality import quality, quality_attributes, states_line
 from coupling.refused import Refused
 from coupling.runs.stop_signals import stop_signals
+from mpm.k0_procedure import bond_friction
 
 MOST_TIME_FOR_CHECKPOINTS = 0.02  # share of the wall time that writing them may take
 # Share of the bonded shear that may slip away without a warning: a third raises the largest initial moment of `quick`
@@ -126,7 +127,7 @@ class RecordedSimulation:
         share, scene = self.simulation.unborne_shear, self.scene
         self.writer.attributes["initial_unborne_shear"] = share
         if share > MOST_UNBORNE:
-            asked = max(scene.bond_friction(tunnel) for tunnel in scene.tunnels)
+            asked = max(bond_friction(scene, tunnel) for tunnel in scene.tunnels)
             rougher = f"give a coefficient of {math.ceil(100 * asked) / 100:g} or more, or " if asked <= 2 else ""
             self.warn(
                 "initial_contact = 'bonded' must be borne by tunnels.friction_coefficient, which bears "

@@ -3,8 +3,9 @@
 from typing import Any
 
 from coupling.scenes.scene import Scene
+from mpm.k0_procedure import bond_friction, lateral_pressure_range, yield_depth
+from mpm.laws.soil import Soil
 from mpm.scene import Scene as MpmScene
-from mpm.scene import Soil
 
 
 def features(scene: Scene, threads: int, why_alone: str = "one thread") -> list[dict[str, Any]]:
@@ -111,8 +112,8 @@ def initial_k0(scene: MpmScene) -> list[dict[str, Any]]:
     """
     rows = []
     for soil in scene.soils:
-        lowest, highest = scene.lateral_pressure_range(soil)
-        depth = None if soil.k0 is not None else scene.yield_depth(soil, soil.elastic_k0)
+        lowest, highest = lateral_pressure_range(scene, soil)
+        depth = None if soil.k0 is not None else yield_depth(scene, soil, soil.elastic_k0)
         source = "gravity loading" if highest == soil.elastic_k0 else "yield surface"
         source = "given" if soil.k0 is not None else source
         rows.append({"soil": soil.name, "lowest": lowest, "highest": highest, "source": source, "yield_depth": depth})
@@ -142,7 +143,7 @@ def _velocities(s):
 
 def _initial_slip(s):
     """Whether the lining's friction does not bear the K0 stress of bonded ground, and why."""
-    short = [(s.bond_friction(t), t.friction_coefficient) for t in s.tunnels]
+    short = [(bond_friction(s, t), t.friction_coefficient) for t in s.tunnels]
     if not short:
         return False, "no tunnel"
     asked, given = max(short, key=lambda pair: pair[0] - pair[1])

@@ -11,6 +11,7 @@ from coupling.refused import Refused, SceneError
 from coupling.scenes.layers import changed, entry_at, nested, read_scene_data
 from coupling.scenes.scene import Scene, make_scene
 from coupling.studies.design import AS_IT_IS, Study, StudyError, short_names, value_text
+from mpm.k0_procedure import lateral_pressure_range
 
 #: Changes when stored cases can no longer be used.
 FORMAT = "2"
@@ -93,7 +94,7 @@ def _value_in(scene, name):
     """Value of a complete scene at a dotted name, a K0 that is left out as it is used; None where it has none."""
     value = scene.model_dump()
     for soil, table in zip(scene.soils, value["soils"], strict=True):
-        lowest, highest = scene.lateral_pressure_range(soil)
+        lowest, highest = lateral_pressure_range(scene, soil)
         table["k0"] = highest if lowest == highest else None
     return entry_at(value, name.split("."))
 

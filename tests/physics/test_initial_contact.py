@@ -8,6 +8,7 @@ import mpm
 from coupling.runs.recorded_simulation import MOST_UNBORNE
 from coupling.scenes.features import features
 from coupling.scenes.layers import scene_names
+from mpm.k0_procedure import bond_friction, lateral_pressure_range
 from verification.small_event import small_scene
 
 QUICK = coupling.load_scene("quick")
@@ -77,7 +78,7 @@ def test_friction_that_bears_the_bond_is_the_largest_of_shear_over_pressure(k0):
     scene = slit(k0)
     a = np.linspace(0.0, np.pi, 100_001)
     ratio = (1 - k0) * np.sin(a) * np.cos(a) / (np.cos(a) ** 2 + k0 * np.sin(a) ** 2)
-    assert scene.bond_friction(scene.tunnels[0]) == pytest.approx(np.abs(ratio).max(), abs=1e-8)
+    assert bond_friction(scene, scene.tunnels[0]) == pytest.approx(np.abs(ratio).max(), abs=1e-8)
 
 
 def test_friction_that_bears_the_bond_is_of_the_soils_beside_the_tunnel():
@@ -85,9 +86,9 @@ def test_friction_that_bears_the_bond_is_of_the_soils_beside_the_tunnel():
     lower = upper.model_copy(update={"top_depth": 40.0, "k0": 0.43})
     alone, scene = (QUICK.model_copy(update={"soils": soils}) for soils in ((upper,), (upper, lower)))
     tunnel = scene.tunnels[0]
-    assert scene.bond_friction(tunnel) == alone.bond_friction(tunnel) < 0.28
+    assert bond_friction(scene, tunnel) == bond_friction(alone, tunnel) < 0.28
     deep = tunnel.model_copy(update={"cover": 35.0})
-    assert scene.bond_friction(deep) > 0.43
+    assert bond_friction(scene, deep) > 0.43
 
 
 @pytest.mark.parametrize(("friction", "slips"), [(0.2, True), (0.29, False)])
@@ -104,7 +105,7 @@ def test_built_in_scenes_bear_most_of_the_bond_or_ask_for_friction(name):
     scene = coupling.load_scene(name)
     shares = [
         share_beyond(k0, tunnel.friction_coefficient)
-        for soil in scene.soils for k0 in scene.lateral_pressure_range(soil) for tunnel in scene.tunnels
+        for soil in scene.soils for k0 in lateral_pressure_range(scene, soil) for tunnel in scene.tunnels
     ]  # fmt: skip
     assert scene.initial_contact == "frictional" or max(shares) < MOST_UNBORNE
 

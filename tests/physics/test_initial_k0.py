@@ -15,7 +15,7 @@ from coupling.report.trust import initial_theory
 from coupling.runs.plan import rough_plan
 from coupling.scenes.features import features, initial_k0
 from mpm.fields import values
-from mpm.k0_procedure import initial_stress
+from mpm.k0_procedure import bond_friction, initial_stress, lateral_pressure_range, yield_depth
 from mpm.points import fill
 from verification.small_event import COARSE, small_scene
 
@@ -121,11 +121,11 @@ def test_undrained_clay_differs_by_twice_its_strength_at_most():
     soil = scene.soils[0]
     # (1 - 3/7) s_v = 2 c
     depth = 2 * 30e3 / (4 / 7 * BUOYANT)
-    assert scene.yield_depth(soil, soil.elastic_k0) == pytest.approx(depth, abs=0.01)  # found to a centimetre
+    assert yield_depth(scene, soil, soil.elastic_k0) == pytest.approx(depth, abs=0.01)  # found to a centimetre
     for vertical in (0.0, 50e3, 100e3, 300e3):
         horizontal = soil.lateral_pressure_coefficient(vertical) * vertical
         assert horizontal == pytest.approx(max(3 / 7 * vertical, vertical - 60e3), rel=1e-12)
-    assert scene.lateral_pressure_range(soil) == pytest.approx((3 / 7, 1 - 60e3 / (BUOYANT * 50.0)), rel=1e-12)
+    assert lateral_pressure_range(scene, soil) == pytest.approx((3 / 7, 1 - 60e3 / (BUOYANT * 50.0)), rel=1e-12)
 
 
 @pytest.mark.parametrize("soil", SOILS, ids=NAMES)
@@ -153,10 +153,10 @@ def test_friction_that_bears_the_bond_is_of_the_k0_in_force():
         vertical = BUOYANT * depth
         elastic = soil["poissons_ratio"] / (1 - soil["poissons_ratio"])
         k0 = np.maximum(elastic, least_horizontal(soil, vertical) / vertical)
-        assert scene.bond_friction(tunnel) == pytest.approx((np.abs(1 - k0) / (2 * np.sqrt(k0))).max(), rel=1e-9)
+        assert bond_friction(scene, tunnel) == pytest.approx((np.abs(1 - k0) / (2 * np.sqrt(k0))).max(), rel=1e-9)
     # nothing presses from the side: no friction bears that
     weightless = ground({"model": "elastic", "poissons_ratio": 0.0})
-    assert math.isinf(weightless.bond_friction(weightless.tunnels[0]))
+    assert math.isinf(bond_friction(weightless, weightless.tunnels[0]))
 
 
 def test_plan_and_scene_say_which_k0_is_in_force_and_why():
