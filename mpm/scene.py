@@ -7,15 +7,15 @@ left out; numerical ones may have one.
 """
 
 import math
-import os
-from functools import cached_property
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Union
 
+import psutil
 from pydantic import Field, SerializeAsAny, WrapValidator, model_validator
 
 from mpm.k0_procedure import check_k0, initial_stress
 from mpm.laws.law import built_in_laws, soil_of_its_law
+from mpm.memory import estimated_bytes, estimated_elements
 from mpm.quantities import Acceleration, Angle, Density, Length, Mass, Part, Pressure, Time, in_unit
 from mpm.walls.sides import SIDES
 
@@ -280,11 +280,11 @@ class Scene(Part):
                 f"symmetry: 'half' must mirror the scene in x = 0, got {self.asymmetry}; write symmetry = 'auto'"
             )
         self._check_length()
-        needed, available = self.estimated_bytes, _physical_memory()
+        needed, available = estimated_bytes(self), psutil.virtual_memory().total
         if needed > available:
             raise ValueError(
                 f"discretisation: must fit in memory ({available / 1e9:.3g} GB), got about {needed / 1e9:.3g} GB for "
-                f"{self.estimated_elements:.2g} elements; raise element_size, element_size_lining or size_growth"
+                f"{estimated_elements(self):.2g} elements; raise element_size, element_size_lining or size_growth"
             )
         return self
 
@@ -439,29 +439,6 @@ class Scene(Part):
                 f"{tunnel.lining_harmonics}; lower it, or discretisation.element_size_lining"
             )
 
-    @cached_property
-    def estimated_elements(self) -> float:
-        """Rough number of elements that are computed, from the integral of the inverse cell area, four a cell [-]."""
-        d = self.discretisation
-        growth = d.growth
-        cells = self.box.width * (self.box.depth + (self.box.headroom or d.element_size)) / d.element_size**2
-        for t in self.tunnels:
-            cells += _graded(2 * math.pi * t.outer_radius, d.element_size_lining, d.element_size, growth)
-        if self.gate is not None:
-            t = self.tunnels[self.gate.tunnel]
-            size = self.gate.width / d.elements_across_gate
-            cells += (t.outer_radius - t.inner_radius) * self.gate.width / size**2
-            cells += _fanned(self.gate.width, size, min(d.element_size_lining, d.element_size), growth)
-            if self.interior == "resolved":
-                cells += math.pi * t.inner_radius**2 / d.element_size_interior**2
-                cells += _fanned(self.gate.width, size, d.element_size_interior, growth)
-        return 2 * cells if self.is_half else 4 * cells
-
-    @property
-    def estimated_bytes(self) -> float:
-        """Memory of a run [bytes]: an element's mesh, adjacency and buffers, a point's state and two copies."""
-        return self.estimated_elements * (1500 + 600 * self.discretisation.points_per_element)
-
 
 def check_scene(scene: object) -> None:
     """Refuse what is no scene.
@@ -474,33 +451,3 @@ def check_scene(scene: object) -> None:
         raise ValueError(
             f"scene: must be an mpm.Scene, got a {type(scene).__name__}; coupling.load_scene('quick') is one"
         )
-
-
-def _physical_memory():
-    """Memory of this machine [bytes]; infinite where the system does not tell."""
-    try:
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):
-        return math.inf
-
-
-def _graded(length, small, large, growth):
-    """Integral of 1/size^2 - 1/large^2 beside a circle of the given length whose size grows away from it.
-
-    The area grows with the distance as well: that of a circle of this length.
-    """
-    if small >= large:
-        return 0.0
-    reach = (large - small) / growth
-    curved = 2 * math.pi / growth**2 * (math.log(large / small) + small / large - 1)
-    return length * (1 / small - 1 / large) / growth + curved - (length + math.pi * reach) * reach / large**2
-
-
-def _fanned(width, small, large, growth):
-    """Integral of 1/size^2 - 1/large^2 over the half plane before a gap whose size grows away from it."""
-    if small >= large:
-        return 0.0
-    reach = (large - small) / growth
-    fan = math.pi / growth**2 * (math.log(large / small) + small / large - 1)
-    strip = width * ((1 / small - 1 / large) / growth - reach / large**2)
-    return fan - 0.5 * math.pi * reach**2 / large**2 + strip

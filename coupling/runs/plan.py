@@ -139,11 +139,12 @@ def rough_plan(
     Raises coupling.refused.Refused: too little memory.
     """
     from mpm.machine.threads import check_threads
+    from mpm.memory import estimated_bytes, estimated_elements
     from mpm.solver import threads_used
 
     scene = _checked(scene, warn)
     check_threads(threads)
-    elements, interval, stop = scene.estimated_elements, scene.output.interval, scene.stop.time
+    elements, interval, stop = estimated_elements(scene), scene.output.interval, scene.stop.time
     sizes = [scene.discretisation.element_size] + [scene.discretisation.element_size_lining] * bool(scene.tunnels)
     if scene.gate is not None:
         sizes.append(scene.gate.width / scene.discretisation.elements_across_gate)
@@ -156,7 +157,7 @@ def rough_plan(
         "dt": dt,
         "steps_to_stop_time": None if stop is None else _rough_steps(dt, interval, stop),
         "expected_steps": _rough_steps(dt, interval, expected_time(scene)),
-        "memory_bytes": math.ceil(scene.estimated_bytes),
+        "memory_bytes": math.ceil(estimated_bytes(scene)),
     }
 
 

@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import coupling
+from mpm.memory import estimated_elements
 from mpm.mesh import CHANNEL, HEADROOM, INTERIOR, SOIL, Mesh, MeshError, altitudes, angles, areas
 from mpm.mesh.build import build_mesh
 from mpm.mesh.sizes import element_size
@@ -215,7 +216,7 @@ def test_meshing_the_largest_case_takes_seconds():
 def test_estimated_elements_are_those_of_the_mesh_within_a_fifth(name):
     scene = coupling.load_scene(name)
     computed = len(build_mesh(scene).elements) / (2 if scene.is_half else 1)
-    assert scene.estimated_elements == pytest.approx(computed, rel=0.2)
+    assert estimated_elements(scene) == pytest.approx(computed, rel=0.2)
 
 
 def test_elements_of_a_cell_are_of_one_level(quick_mesh):

@@ -105,12 +105,13 @@ def simulation_fault(place, text, number):
 
     from coupling import load_scene, run
     from coupling.datasets import raw_groups
+    from mpm.memory import estimated_elements
     from verification.child import in_a_process
 
     scene = place / f"run-{number}.toml"
     scene.write_text(text, encoding="utf-8")
     loaded = load_scene(scene)
-    if loaded.estimated_elements > 20_000 or (loaded.stop.time or 1.0) > 0.1:
+    if estimated_elements(loaded) > 20_000 or (loaded.stop.time or 1.0) > 0.1:
         return ""
 
     def work():
