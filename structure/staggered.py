@@ -6,7 +6,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from structure.joint_laws import BoltLaw, LawOfBoth
+from structure.joint_laws import BoltLaw
 from structure.ring import Neighbour
 from structure.ring_forces import RingParts, springs_at
 
@@ -58,7 +58,7 @@ def paired(one: RingParts, other: RingParts, apart: sparse.csr_array, springs: n
         rigid=np.hstack([one.rigid, other.rigid]),
         mean=np.hstack([one.mean, other.mean]) / 2,
         arm=np.concatenate([one.arm, other.arm]),
-        law=LawOfBoth(one.law, other.law),
+        law=one.law.followed_by(other.law),
         faces=both(one.faces, other.faces),
         bolts=both(one.bolts, other.bolts),
         bolt_law=None if one.bolt_law is None else BoltLaw(*map(np.concatenate, pairs)),
