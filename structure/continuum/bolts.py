@@ -41,8 +41,7 @@ def bolt_elongation(ring: Ring, mesh: ContinuumMesh) -> sparse.csr_array:
     """
     half_angle, radius = anchor_places(ring)
     joint = np.radians(ring.joint_angles)
-    n_unknowns = 2 * mesh.n_lines * mesh.n_levels
-    elongation = sparse.csr_array((len(joint), n_unknowns))
+    elongation = sparse.csr_array((len(joint), mesh.n_unknowns))
     layer = np.clip(np.searchsorted(mesh.radius[::2], radius) - 1, 0, mesh.layers - 1)
     across = edge_shapes((radius - mesh.radius[2 * layer]) / mesh.layer_height[layer])
     for side in (1, -1):
@@ -52,15 +51,11 @@ def bolt_elongation(ring: Ring, mesh: ContinuumMesh) -> sparse.csr_array:
                 f"joint_bolts: anchors must lie in concrete, got one of joint {int(np.argmax(column < 0)) + 1} in the"
                 " open gate; shorten the bolts or move the gate"
             )
-        weights = edge_shapes(place)[:, :, None] * across[:, None, :]
+        weights = side * edge_shapes(place)[:, :, None] * across[:, None, :]
         lines = mesh.column_lines[column]
         nodes = lines[:, :, None] * mesh.n_levels + 2 * layer[:, None, None] + np.arange(3)
         lean = mesh.angle[lines][:, :, None] - joint[:, None, None]
-        rows = np.broadcast_to(np.arange(len(joint))[:, None, None], weights.shape)
-        for way, axis in enumerate((np.sin(lean), np.cos(lean))):
-            entries = (side * weights * axis).ravel()
-            unknowns = np.broadcast_to(2 * nodes + way, weights.shape).ravel()
-            elongation = elongation + sparse.coo_array((entries, (rows.ravel(), unknowns)), shape=elongation.shape)
+        elongation = elongation + mesh.gathered(nodes, weights * np.sin(lean), weights * np.cos(lean))
     return elongation.tocsr()
 
 

@@ -42,8 +42,7 @@ def traction_operator(ring: Ring, mesh: ContinuumMesh, theta: np.ndarray) -> tup
     clockwise += (1 - clockwise[:, :, 1].sum(1))[:, None, None] * pair
     area = (ring.outer_radius * mesh.column_share[column] * weight)[:, None, None]
     unknown = 2 * outer[:, :, None] + np.arange(2)
-    n_unknowns = 2 * mesh.n_lines * mesh.n_levels
-    return tuple(sampled_operator(unknown, area * part, theta, angle, n_unknowns) for part in (inward, clockwise))
+    return tuple(sampled_operator(unknown, area * part, theta, angle, mesh.n_unknowns) for part in (inward, clockwise))
 
 
 def spring_feelers(ring: Ring, mesh: ContinuumMesh) -> tuple[sparse.csr_array, np.ndarray]:
@@ -60,14 +59,8 @@ def spring_feelers(ring: Ring, mesh: ContinuumMesh) -> tuple[sparse.csr_array, n
     """
     edges = mesh.column_angles()
     area = ring.outer_radius * mesh.column_share * (edges[:, 2] - edges[:, 0])
-    count = len(mesh.column_lines)
-    unknowns = 2 * (mesh.column_lines * mesh.n_levels + mesh.n_levels - 1)
-    rows = np.repeat(np.arange(count), 3)
-    shape = (count, 2 * mesh.n_lines * mesh.n_levels)
-    normal, tangential = (
-        sparse.coo_array((np.tile(EDGE_MEAN, count), (rows, (unknowns + way).ravel())), shape=shape).tocsr()
-        for way in (0, 1)
-    )
+    outer = mesh.column_lines * mesh.n_levels + mesh.n_levels - 1
+    normal, tangential = mesh.gathered(outer, EDGE_MEAN, 0.0), mesh.gathered(outer, 0.0, EDGE_MEAN)
     if ring.ground is not None and ring.ground.slip_at == "centre_line":
         tangential = column_means(mesh, EDGE_MEAN)[1]
     return sparse.vstack([normal, tangential]).tocsr(), np.tile(area, 2)

@@ -21,14 +21,13 @@ def nodes_from_unknowns(mesh: ContinuumMesh) -> sparse.csr_array:
     On the clockwise face of a joint the unknown is the jump across it. A joint of 1e15 N/m2 then acts on tiny unknowns
     of its own, not on the difference of two large ones, whose rounding it would multiply.
     """
-    n_unknowns = 2 * mesh.n_lines * mesh.n_levels
-    along = np.arange(2 * mesh.n_levels)
+    own, along = sparse.eye_array(mesh.n_unknowns, format="csr"), np.arange(2 * mesh.n_levels)
     if not len(mesh.joint_after) or mesh.column_is_strip.any():
-        return sparse.eye_array(n_unknowns, format="csr")
-    after = (2 * mesh.n_levels * mesh.joint_after[:, None] + along).ravel()
-    before = (2 * mesh.n_levels * mesh.joint_before[:, None] + along).ravel()
-    rows, columns = np.append(np.arange(n_unknowns), after), np.append(np.arange(n_unknowns), before)
-    return sparse.coo_array((np.ones(len(rows)), (rows, columns)), shape=(n_unknowns, n_unknowns)).tocsr()
+        return own
+    after, before = (
+        (2 * mesh.n_levels * lines[:, None] + along).ravel() for lines in (mesh.joint_after, mesh.joint_before)
+    )
+    return own + sparse.coo_array((np.ones(len(after)), (after, before)), shape=own.shape).tocsr()
 
 
 def _face_mass(mesh: ContinuumMesh) -> np.ndarray:
@@ -77,12 +76,11 @@ def uneven_stiffness(ring: Ring, mesh: ContinuumMesh) -> sparse.csr_array:
     Springs k_n and k_s per height of what touches, less what they store in opening, rotation and mean dislocation,
     where the joint's own law acts. Never negative.
     """
-    n_unknowns = 2 * mesh.n_lines * mesh.n_levels
     mass = _face_mass(mesh)
     fit, matrix = _best_fit(ring, mesh)
     touching, mean = matrix[0, 0], mass.sum(0)
     rest = (mass - fit.T @ matrix @ fit) / touching, mass / touching - np.outer(mean, mean) / touching**2
-    stiffness = sparse.csr_array((n_unknowns, n_unknowns))
+    stiffness = sparse.csr_array((mesh.n_unknowns, mesh.n_unknowns))
     for direction, face, springs in zip((1, 0), rest, ring.joint_springs.T, strict=False):
         jumps = sparse.vstack([_face_jump(mesh, row, direction) for row in np.eye(mesh.n_levels)]).tocsr()
         stiffness = stiffness + jumps.T @ sparse.kron(face, sparse.diags_array(springs)) @ jumps
@@ -112,14 +110,12 @@ def face_points(ring: Ring, mesh: ContinuumMesh) -> tuple[FacePoints, sparse.csr
             first.append(np.full(count, 2 * layer))
             shapes.append(edge_shapes((at - edges[layer]) / mesh.layer_height[layer]))
     joint, lever, length, first, shapes = map(np.concatenate, (joint, lever, length, first, shapes))
-    level = first[:, None] + np.arange(3)
-    faces = sparse.csr_array((2 * len(joint), 2 * mesh.n_lines * mesh.n_levels))
-    for lines, sign in ((mesh.joint_after, 1.0), (mesh.joint_before, -1.0)):
-        node = lines[joint][:, None] * mesh.n_levels + level
-        for row, way, turn in ((0, 1, 1.0), (1, 0, -1.0)):  # clockwise apart opens, outward apart slides back
-            rows = np.repeat(2 * np.arange(len(joint)) + row, 3)
-            entries = (sign * turn * shapes).ravel()
-            faces = faces + sparse.coo_array((entries, (rows, (2 * node + way).ravel())), shape=faces.shape)
+    faces, gap = sparse.csr_array((2 * len(joint), mesh.n_unknowns)), 2 * np.arange(len(joint))
+    for lines, apart in ((mesh.joint_after, shapes), (mesh.joint_before, -shapes)):
+        node = lines[joint][:, None] * mesh.n_levels + first[:, None] + np.arange(3)
+        # clockwise apart opens, outward apart slides back
+        faces = faces + mesh.gathered(node, 0.0, apart, gap, 2 * len(joint))
+        faces = faces + mesh.gathered(node, -apart, 0.0, gap + 1, 2 * len(joint))
     return FacePoints(joint, lever, length), faces.tocsr()
 
 
@@ -128,20 +124,9 @@ def _face_jump(mesh: ContinuumMesh, weights: np.ndarray, direction: int, before:
 
     Faces of a strip lie at angles of their own; direction 0 is outward, 1 clockwise at the middle of the joint.
     """
-    n_joints = len(mesh.joint_before)
-    apart = (mesh.angle[mesh.joint_after] - mesh.angle[mesh.joint_before] + 1) % (2 * np.pi) - 1
-    level = np.arange(mesh.n_levels)
-    rows, columns, values = [], [], []
-    for lines, off, sign in ((mesh.joint_after, apart / 2, 1.0), (mesh.joint_before, -apart / 2, before)):
-        first = 2 * (lines[:, None] * mesh.n_levels + level)
+    half = ((mesh.angle[mesh.joint_after] - mesh.angle[mesh.joint_before] + 1) % (2 * np.pi) - 1) / 2
+    jumps = sparse.csr_array((len(half), mesh.n_unknowns))
+    for lines, off, sign in ((mesh.joint_after, half, 1.0), (mesh.joint_before, -half, before)):
         axes = (np.cos(off), -np.sin(off)) if direction == 0 else (np.sin(off), np.cos(off))
-        for way in (0, 1):
-            rows.append(np.repeat(np.arange(n_joints), mesh.n_levels))
-            columns.append((first + way).ravel())
-            values.append((sign * axes[way][:, None] * weights).ravel())
-    values = np.concatenate(values)
-    kept = values != 0
-    return sparse.coo_array(
-        (values[kept], (np.concatenate(rows)[kept], np.concatenate(columns)[kept])),
-        shape=(n_joints, 2 * mesh.n_lines * mesh.n_levels),
-    ).tocsr()
+        jumps = jumps + mesh.gathered(mesh.line_nodes(lines), *(sign * axis[:, None] * weights for axis in axes))
+    return jumps.tocsr()

@@ -2,16 +2,18 @@
 
 The mesh is mapped, so it is written down here instead of being asked from a mesher: lines lie exactly on joints and
 gate walls, nodes exactly on both faces, and nothing but the angle of each line has to be chosen, all of them
-radial. Lines are numbered
-clockwise, the nodes of a line outward; two lines at a zero-thickness joint share their places, not their nodes.
+radial. Lines are numbered clockwise, the nodes of a line outward; two lines at a zero-thickness joint share their
+places, not their nodes. Unknowns: radial (outward), then tangential (clockwise) displacement of every node.
 """
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy import sparse
 
 from structure.ring import Ring
 
@@ -155,6 +157,11 @@ class ContinuumMesh:
         self.joint_before, self.joint_after = last[before], first[after % len(cut)]
 
     @property
+    def n_unknowns(self) -> int:
+        """Two of every node."""
+        return 2 * self.n_lines * self.n_levels
+
+    @property
     def node_angle(self) -> np.ndarray:
         """(n_nodes,) float64 [rad]; node number = line * n_levels + level."""
         return np.repeat(self.angle, self.n_levels)
@@ -163,6 +170,29 @@ class ContinuumMesh:
     def node_radius(self) -> np.ndarray:
         """(n_nodes,) float64 [m]."""
         return np.tile(self.radius, self.n_lines)
+
+    def line_nodes(self, lines: np.ndarray) -> np.ndarray:
+        """(..., n_levels) nodes of lines (...), outward."""
+        return np.asarray(lines)[..., None] * self.n_levels + np.arange(self.n_levels)
+
+    def gathered(
+        self,
+        nodes: np.ndarray,
+        radial: np.ndarray | float,
+        tangential: np.ndarray | float,
+        rows: np.ndarray | None = None,
+        n_rows: int | None = None,
+    ) -> sparse.csr_array:
+        """Weighted sums of the displacements of nodes (n, ...), (n_rows, n_unknowns); weights broadcast to the nodes.
+
+        rows : (n,) int, the row of each; one after the other where left out.
+        """
+        rows, n_rows = (np.arange(len(nodes)), len(nodes)) if rows is None else (rows, n_rows)
+        weights = np.stack([np.broadcast_to(way, nodes.shape) for way in (radial, tangential)], axis=-1).ravel()
+        columns = (2 * nodes[..., None] + np.arange(2)).ravel()
+        rows, kept = np.repeat(rows, 2 * math.prod(nodes.shape[1:])), weights != 0
+        shape = (n_rows, self.n_unknowns)
+        return sparse.coo_array((weights[kept], (rows[kept], columns[kept])), shape=shape).tocsr()
 
     def column_angles(self) -> np.ndarray:
         """(n_columns, 3) float64 angles of the lines of each column [rad], ascending."""

@@ -95,20 +95,11 @@ def section_displacements(
     for outward, along, turned in ((cosine, sine, 0.0), (-sine, cosine, 1.0)):
         off = centre_radius * (turned - along.sum(axis=1))[:, None] * shapes
         parts = outward[:, :, None] * mesh.level_mean, along[:, :, None] * mesh.level_mean + off[:, :, None] * slope
-        rows.append(sum(_gather(mesh, lines, part, inside, len(theta), way) for way, part in enumerate(parts)).tocsr())
+        rows.append(mesh.gathered(mesh.line_nodes(lines), *parts, inside, len(theta)))
     return rows[0], rows[1]
 
 
 def column_means(mesh: ContinuumMesh, edge_mean: np.ndarray) -> tuple[sparse.csr_array, sparse.csr_array]:
     """Mean radial and tangential displacement of whole columns, (n_columns, n_unknowns) each."""
-    count = len(mesh.column_lines)
-    weights = np.broadcast_to(edge_mean[:, None] * mesh.level_mean, (count, 3, mesh.n_levels))
-    return tuple(_gather(mesh, mesh.column_lines, weights, np.arange(count), count, way) for way in (0, 1))
-
-
-def _gather(mesh, lines, weights, rows, n_rows, direction):
-    unknowns = 2 * (lines[:, :, None] * mesh.n_levels + np.arange(mesh.n_levels)) + direction
-    return sparse.coo_array(
-        (weights.ravel(), (np.repeat(rows, 3 * mesh.n_levels), unknowns.ravel())),
-        shape=(n_rows, 2 * mesh.n_lines * mesh.n_levels),
-    ).tocsr()
+    nodes, weights = mesh.line_nodes(mesh.column_lines), edge_mean[:, None] * mesh.level_mean
+    return mesh.gathered(nodes, weights, 0.0), mesh.gathered(nodes, 0.0, weights)
