@@ -18,7 +18,7 @@ from structure.balance import borne, even_loads, without_unborne
 from structure.lining import THETA, LiningFailure, LiningModel, origin, response_dataset
 from structure.newton import NoEquilibrium, RingEquilibrium
 from structure.pressures import check_pressures
-from structure.response import BOLT_FORCE, FORCES, RESPONSE
+from structure.response import BOLT_FORCE, FORCES, RESPONSE, described
 from structure.ring import Ring
 from structure.ring_forces import RingForces, RingParts
 from structure.staggered import coupling_springs, paired
@@ -27,10 +27,6 @@ from structure.staggered import coupling_springs, paired
 SIDES = (-1e-9, 1e-9)
 #: Matrices are so small that threads only wait for each other: on a busy machine two cost 200 times one's time.
 one_thread = threadpool_limits.wrap(limits=1, user_api="blas")
-
-
-def _described(values, units, long_name):
-    return values, {"units": units, "long_name": long_name}
 
 
 class Readings(NamedTuple):
@@ -155,9 +151,8 @@ class DiscreteLining(LiningModel):
         own, other = displacements[:, :size], displacements[:, size:]
         fields = {}
         for name, force in self.beside._section_forces(other):
-            meaning = RESPONSE[name]
-            attributes = {"units": meaning[1], "long_name": f"{meaning[2]}, of the ring beside"}
-            fields[f"neighbour_{name}"] = ("time", "theta"), force, attributes
+            _, units, long_name = RESPONSE[name]
+            fields[f"neighbour_{name}"] = force, units, f"{long_name}, of the ring beside"
         stiffnesses = neighbour.radial_stiffness, neighbour.tangential_stiffness
         rows = zip(
             ("radial", "tangential"), stiffnesses, self.readings.movement, self.beside.readings.movement, strict=True
@@ -165,8 +160,8 @@ class DiscreteLining(LiningModel):
         for way, stiffness, here, there in rows:
             passed = stiffness * ((here @ own.T).T - (there @ other.T).T)
             about = f"{way} force on the ring beside per metre of a circumferential joint"
-            fields[f"circumferential_{way}_force"] = ("time", "theta"), passed, {"units": "N/m", "long_name": about}
-        return fields
+            fields[f"circumferential_{way}_force"] = passed, "N/m", about
+        return described(("time", "theta"), fields)
 
     @one_thread
     def contact_field(self, pressures: xr.Dataset) -> xr.Dataset:
@@ -199,9 +194,8 @@ class DiscreteLining(LiningModel):
             "lever": (points.lever, "m", "distance outward from the centre line"),
         }
         return xr.Dataset(
-            {name: (("time", "contact_point"), *_described(*about)) for name, about in fields.items()},
-            {name: ("contact_point", *_described(*about)) for name, about in places.items()}
-            | {"time": checked["time"]},
+            described(("time", "contact_point"), fields),
+            described("contact_point", places) | {"time": checked["time"]},
             {"title": f"contact in the joints: {self.name} model"} | origin(self.ring, self.name) | self.details(),
         )
 

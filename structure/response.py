@@ -14,7 +14,7 @@ Signs, in one place:
 - Convergence positive when the diameter shortens; settlement downward positive.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 #: name: (dimensions, units, long name)
 RESPONSE = {
@@ -66,6 +66,16 @@ COORDINATES = {
 PRESSURES = ("soil_pressure", "water_pressure", "soil_shear")
 #: What the cross sections of a ring carry.
 FORCES = ("axial_force", "shear_force", "bending_moment")
+
+
+def described(
+    dimensions: str | tuple[str, ...], fields: dict[str, tuple[Any, str, str]]
+) -> dict[str, tuple[str | tuple[str, ...], Any, dict[str, str]]]:
+    """Variables as xarray takes them, all over the same dimensions, from name: (values, units, long name)."""
+    return {
+        name: (dimensions, values, {"units": units, "long_name": long_name})
+        for name, (values, units, long_name) in fields.items()
+    }
 
 
 class Shown(NamedTuple):

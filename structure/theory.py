@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from structure.response import COORDINATES, described
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -84,14 +86,9 @@ def theoretical_pressures(
         ),
     }
     return xr.Dataset(
-        {
-            name: (("time", "theta"), values[None], {"units": "Pa", "long_name": long_name})
-            for name, (values, long_name) in fields.items()
-        },
-        coords={
-            "time": ("time", [0.0], {"units": "s", "long_name": "time since the gate opened"}),
-            "theta": ("theta", theta, {"units": "degree", "long_name": "angle from the crown, clockwise"}),
-        },
+        described(("time", "theta"), {name: (values[None], "Pa", about) for name, (values, about) in fields.items()}),
+        described("time", {"time": ([0.0], *COORDINATES["time"])})
+        | described("theta", {"theta": (theta, *COORDINATES["theta"])}),
         attrs={"title": "theoretical pressures: overburden with K0, hydrostatic water"},
     )
 

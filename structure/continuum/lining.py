@@ -19,15 +19,15 @@ from structure.discrete import SIDES, DiscreteLining, Readings, one_thread
 from structure.joint_laws import FaceLaw, JointLaw, bolt_law
 from structure.lining import THETA, origin
 from structure.pressures import check_pressures
-from structure.response import FORCES
+from structure.response import FORCES, described
 from structure.ring import Ring, alone, check_ring
 from structure.ring_forces import RingParts, tilted, whole_movements
 
-#: Name: (dimensions, units, long name) of the stress dataset.
+#: Of the stress dataset, name: (which stress, its sign).
 STRESSES = {
-    "stress_rr": ("Pa", "radial stress in the lining, tension positive"),
-    "stress_tt": ("Pa", "hoop stress in the lining, tension positive"),
-    "stress_rt": ("Pa", "shear stress in the lining, positive where it turns a radius clockwise outside"),
+    "stress_rr": ("radial", "tension positive"),
+    "stress_tt": ("hoop", "tension positive"),
+    "stress_rt": ("shear", "positive where it turns a radius clockwise outside"),
 }
 
 
@@ -127,10 +127,9 @@ class ContinuumLining(DiscreteLining):
         ordered = check_pressures(pressures, self.ring)
         displacements = (self._to_nodes @ self.solve(ordered).displacements.T).T
         stress = self._stress
-        values = (stress.radial, stress.hoop, stress.shear)
         fields = {
-            name: (("time", "point"), (part @ displacements.T).T, {"units": units, "long_name": long_name})
-            for (name, (units, long_name)), part in zip(STRESSES.items(), values, strict=True)
+            name: ((getattr(stress, kind) @ displacements.T).T, "Pa", f"{kind} stress in the lining, {sign}")
+            for name, (kind, sign) in STRESSES.items()
         }
         sine, cosine = np.sin(stress.angle), np.cos(stress.angle)
         element = np.repeat(np.arange(len(stress.angle) // 4), 4)
@@ -141,14 +140,11 @@ class ContinuumLining(DiscreteLining):
             "radius": (stress.radius, "m", "distance from the axis"),
             "element": (element, "1", "number of the element"),
         }
-        coordinates = {
-            name: ("point", values, {"units": units, "long_name": long_name})
-            for name, (values, units, long_name) in places.items()
-        }
-        coordinates["time"] = ("time", ordered["time"].values, dict(ordered["time"].attrs))
-        title = "stresses in the lining: continuum model"
-        attributes = {"title": title} | origin(self.ring, self.name) | self.details()
-        return xr.Dataset(fields, coords=coordinates, attrs=attributes)
+        return xr.Dataset(
+            described(("time", "point"), fields),
+            described("point", places) | {"time": ("time", ordered["time"].values, dict(ordered["time"].attrs))},
+            {"title": "stresses in the lining: continuum model"} | origin(self.ring, self.name) | self.details(),
+        )
 
     def _parts(self, ring):
         mesh, concrete, to_nodes = self.mesh, self._concrete, self._to_nodes
