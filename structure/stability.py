@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from structure.arcs import periodic_shares
 from structure.ring import Ring
 
 if TYPE_CHECKING:
@@ -32,12 +31,10 @@ def resultants(pressures: xr.Dataset, outer_radius: float) -> dict[str, np.ndarr
     """
     theta = np.radians(np.arange(0.25, 360, 0.5))
     at = np.radians(pressures["theta"].values.astype(float))
-    order = np.argsort(at % (2 * np.pi))
-    (first, second), (near, far) = periodic_shares(at[order] % (2 * np.pi), theta)
 
     def around(name):
-        values = pressures[name].transpose("time", "theta").values[:, order]
-        return near * values[:, first] + far * values[:, second]
+        rows = pressures[name].transpose("time", "theta").values
+        return np.stack([np.interp(theta, at, row, period=2 * np.pi) for row in rows])
 
     arc, lower = outer_radius * np.radians(0.5), np.cos(theta) < 0
     upward = -np.cos(theta) * around("soil_pressure") - np.sin(theta) * around("soil_shear")

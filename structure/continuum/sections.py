@@ -41,11 +41,10 @@ def _between_stations(mesh: ContinuumMesh, theta: np.ndarray) -> sparse.csr_arra
     edges, count = mesh.column_angles(), len(mesh.column_lines)
     span = edges[:, 2] - edges[:, 0]
     apart = np.abs((edges[np.arange(1, count + 1) % count, 0] - edges[:, 2] + np.pi) % (2 * np.pi) - np.pi)
-    first, second = 2 * column, 2 * column + 1
-    leads_back = (place < STRESS_POINTS[0]) & (apart[column - 1] < 1e-9)
-    leads_on = (place > STRESS_POINTS[1]) & (apart[column] < 1e-9)
-    first = np.where(leads_back, first - 1, np.where(leads_on, second, first)) % (2 * count)
-    second = np.where(leads_back, 2 * column, np.where(leads_on, second + 1, second)) % (2 * count)
+    leads_back = ((place < STRESS_POINTS[0]) & (apart[column - 1] < 1e-9)).astype(int)
+    leads_on = ((place > STRESS_POINTS[1]) & (apart[column] < 1e-9)).astype(int)
+    first = (2 * column + leads_on - leads_back) % (2 * count)
+    second = (first + 1) % (2 * count)
     station = (edges[:, :1] + span[:, None] * STRESS_POINTS).ravel()
     gap = (station[second] - station[first]) % (2 * np.pi)
     here = edges[column, 0] + place * span[column]
