@@ -22,30 +22,21 @@ if TYPE_CHECKING:
 
     __version__: str
 
-_HOMES = {
-    "Ring": "structure.ring",
-    "Ground": "structure.ring",
-    "Neighbour": "structure.ring",
-    "GushingWarning": "structure.inputs",
-    "InputError": "structure.inputs",
-    "LiningModel": "structure.lining",
-    "LiningFailure": "structure.lining",
-    "additional": "structure.lining",
-    "check": "structure.checks",
-    "Limits": "structure.limits",
-    "CapacityRule": "structure.limits",
-    "utilisations": "structure.passing",
-    "SegmentSection": "structure.segment",
-    "BeamSpringLining": "structure.beams.lining",
-    "ContinuumLining": "structure.continuum.lining",
-    "Gate": "structure.continuum.mesh",
-    "GasketGroove": "structure.continuum.mesh",
-    "Bolts": "structure.ring",
-    "lining_model": "structure.models",
-    "lining_model_names": "structure.models",
-    "register_lining_model": "structure.models",
-    "theoretical_pressures": "structure.theory",
+_MODULES = {
+    "beams.lining": ["BeamSpringLining"],
+    "checks": ["check"],
+    "continuum.lining": ["ContinuumLining"],
+    "continuum.mesh": ["GasketGroove", "Gate"],
+    "inputs": ["GushingWarning", "InputError"],
+    "limits": ["CapacityRule", "Limits"],
+    "lining": ["LiningFailure", "LiningModel", "additional"],
+    "models": ["lining_model", "lining_model_names", "register_lining_model"],
+    "passing": ["utilisations"],
+    "ring": ["Bolts", "Ground", "Neighbour", "Ring"],
+    "segment": ["SegmentSection"],
+    "theory": ["theoretical_pressures"],
 }
+_HOMES = {name: f"structure.{module}" for module, names in _MODULES.items() for name in names}
 
 __all__ = [
     "BeamSpringLining",
