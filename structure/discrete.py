@@ -178,7 +178,7 @@ class DiscreteLining(LiningModel):
             contact_pressure, contact_shear [Pa] and contact_gap [m] (time, contact_point), and of every point its joint
             and its place outward from the centre line, `lever` [m].
         """
-        if self.parts.faces is None:
+        if self.ring.joint_contact != "face":
             raise ValueError("contact_field: joint_contact of the ring must be 'face', got 'section'; set it")
         checked, points = check_pressures(pressures, self.ring), self.parts.law.points
         states = self.solve(checked)
@@ -265,7 +265,7 @@ class DiscreteLining(LiningModel):
         equilibrium, parts = self._forces, self.parts
         opening, dislocation, rotation = np.moveaxis(equilibrium.jumps(displacements), -1, 0)
         forces = equilibrium.joint_forces(displacements, slips)
-        if parts.faces is None:
+        if self.ring.joint_contact == "section":
             axial, shear, moment = forces.axial, forces.shear, forces.moment
         else:
             points = parts.law.points
@@ -274,7 +274,7 @@ class DiscreteLining(LiningModel):
                 each @ of_joint for each in (forces.axial, forces.shear, -forces.axial * points.lever)
             )
         fields = {}
-        if parts.bolts is not None:
+        if self.ring.bolts:
             pull, _ = equilibrium.bolt_forces(displacements)
             fields["joint_bolt_force"] = pull
             axial = axial - pull

@@ -259,6 +259,6 @@ class BoltLaw(NamedTuple):
 
 
 def bolt_law(ring: Ring) -> BoltLaw:
-    """That of the bolts of a ring that has some."""
+    """That of the bolts of a ring, of none where it has none."""
     stated = [(bolts.stiffness, bolts.slack, bolts.preload) for bolts in ring.bolts]
-    return BoltLaw(*np.array(stated).T)
+    return BoltLaw(*np.reshape(stated, (-1, 3)).T)

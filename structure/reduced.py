@@ -75,7 +75,7 @@ class ReducedRing:
         self.outer_radius, self.radius = ring.outer_radius, ring.centre_radius
         check_movable(ring)
         self._lining, self.law, self.bolt_law = lining, parts.law, parts.bolt_law
-        linear = self.law.linear and self.bolt_law is None
+        linear = self.law.linear and not ring.bolts
         mass, rigid = density * parts.mass, parts.rigid.T
         deformed = _orthonormal(_answers(lining, mass, rigid, n_harmonics), mass)
         deformed *= np.sqrt(mass_of_ring := float(rigid[:, 0] @ (mass @ rigid[:, 0])))
@@ -84,14 +84,13 @@ class ReducedRing:
         self.mass[:3, :3] = rigid.T @ (mass @ rigid)
         np.fill_diagonal(self.mass[3:, 3:], mass_of_ring)
         self.weight = -gravity * (self.basis.T @ (mass @ rigid[:, 1]))
-        held = parts.linear if linear else parts.body
+        held = parts.linear if linear else parts.segments
         self.stiffness = np.zeros_like(self.mass)
         self.stiffness[3:, 3:] = deformed.T @ (held @ deformed)
         jumps = parts.jumps @ self.basis
         jumps[:, :3] = 0.0
         self.jumps = jumps.reshape(-1, 3, self.basis.shape[1])
-        moves = [jumps] if parts.bolts is None else [jumps, parts.bolts @ self.basis]
-        self.moves = np.vstack([jumps[:0]] if linear else moves)
+        self.moves = jumps[:0] if linear else np.vstack([jumps, parts.bolts @ self.basis])
         self.moves[:, :3] = 0.0
         self._bolt_shares = lining.readings.bolt_shares
         self._readings = [part @ self.basis for part in lining.readings.forces]
@@ -141,8 +140,8 @@ class ReducedRing:
         force, tangent = np.zeros(len(moved)), np.zeros((len(moved),) * 2)
         force[:ways] = resisting.ravel()
         tangent[:ways, :ways].reshape(-1, 3, self.law.count, 3)[joint, :, joint] = tangents
-        if self.bolt_law is not None:
-            force[ways:], tangent[range(ways, len(moved)), range(ways, len(moved))] = self.bolt_law.pull(moved[ways:])
+        bolts = np.arange(ways, len(moved))
+        force[bolts], tangent[bolts, bolts] = self.bolt_law.pull(moved[bolts])
         return force, tangent, slip
 
     def joints_between(
@@ -195,8 +194,7 @@ class ReducedRing:
                 share *= 0.5
             tried, moved = both + share * step, np.empty_like(free)
             moved[:ways] = self.law.between(tried[:ways].reshape(-1, 3), stiffness[:ways].reshape(-1, 3)).ravel()
-            if self.bolt_law is not None:
-                moved[ways:] = self.bolt_law.between(tried[ways:], stiffness[ways:])
+            moved[ways:] = self.bolt_law.between(tried[ways:], stiffness[ways:])
         raise NoEquilibrium(f"joints are {np.abs(apart).max():.3g} m apart after {MAX_ITERATIONS} iterations")
 
     def joints(self, displacement: np.ndarray, slip: np.ndarray) -> dict[str, np.ndarray]:
@@ -226,10 +224,10 @@ def _answers(lining: DiscreteLining, mass: sparse.csr_array, rigid: np.ndarray, 
     ring, parts = lining.ring, lining.parts
     along, across = ring.axial_stiffness / ring.centre_radius, ring.bending_stiffness / ring.centre_radius
     joints = springs_at(parts.jumps, np.tile([along, along, across], parts.law.count))
-    held, carried = (parts.body + joints).tocsr(), mass @ rigid
+    held, carried = (parts.segments + joints).tocsr(), mass @ rigid
     phase = np.outer(FACE, np.arange(n_harmonics + 1))
     harmonics = np.hstack([np.cos(phase), np.sin(phase[:, 1:])])
-    pairs = [part.T.toarray() for part in (parts.jumps, parts.bolts) if part is not None]
+    pairs = [part.T.toarray() for part in (parts.jumps, parts.bolts)]
     loads = np.hstack([*(part @ harmonics for part in lining.tractions(FACE)), *pairs])
     loads = loads / np.abs(loads).max(axis=0)
     loads -= carried @ np.linalg.solve(rigid.T @ carried, rigid.T @ loads)

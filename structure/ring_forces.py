@@ -22,14 +22,12 @@ class RingParts(NamedTuple):
     """A ring as matrices over the n unknowns of a discretisation: all that equilibrium, balances and movements need.
 
     segments : (n, n) sparse
-        Stiffness of the segments, symmetric.
-    uneven : (n, n) sparse or None
-        What joints store in a gap beyond their jumps, linear under any law; none where faces are plane.
+        Stiffness of the segments, symmetric, and of what joints store in a gap beyond their jumps, linear under any
+        law.
     jumps : (3 n_joints, n) sparse
         Opening, dislocation and rotation of every joint.
-    law : JointLaw or FaceLaw
-    faces : (2 n_points, n) sparse or None
-        Gap and slide at every point of a :class:`structure.joint_laws.FaceLaw`.
+    law, moves : JointLaw or FaceLaw, (law.moves law.count, n) sparse
+        What the joints' law takes of the unknowns: their jumps, or gap and slide at every point of their faces.
     feel, area : (n_springs, n) sparse, (n_springs,) float64
         What the soil springs feel, first all normal ones [m], outward, then as many tangential ones, clockwise; and
         the area that each reaction [Pa] acts on [m2/m].
@@ -50,8 +48,8 @@ class RingParts(NamedTuple):
         Mean movement of the ring to the right, up and clockwise.
     arm : (n,) float64
         1 for displacements, the radius of the centre line for rotations [m].
-    bolts, bolt_law : (n_joints, n) sparse, BoltLaw, or None
-        Elongation of the bolts of every joint.
+    bolts, bolt_law : (n_joints, n) sparse, BoltLaw
+        Elongation of the bolts of every joint; no rows without bolts.
     bolts_reach : bool
         Whether they join places far apart, which would widen the band.
     strips : bool
@@ -59,7 +57,6 @@ class RingParts(NamedTuple):
     """
 
     segments: sparse.csr_array
-    uneven: sparse.csr_array | None
     jumps: sparse.csr_array
     feel: sparse.csr_array
     area: np.ndarray
@@ -73,26 +70,16 @@ class RingParts(NamedTuple):
     mean: np.ndarray
     arm: np.ndarray
     law: JointLaw | FaceLaw
-    faces: sparse.csr_array | None = None
-    bolts: sparse.csr_array | None = None
-    bolt_law: BoltLaw | None = None
+    moves: sparse.csr_array
+    bolts: sparse.csr_array
+    bolt_law: BoltLaw
     bolts_reach: bool = False
     strips: bool = False
 
     @property
-    def moves(self) -> sparse.csr_array:
-        """What the joints' law takes of the unknowns, (law.moves law.count, n)."""
-        return self.jumps if self.faces is None else self.faces
-
-    @property
-    def body(self) -> sparse.csr_array:
-        """Stiffness of all but joints and bolts, (n, n)."""
-        return self.segments if self.uneven is None else (self.segments + self.uneven).tocsr()
-
-    @property
     def linear(self) -> sparse.csr_array:
         """Stiffness of all but bolts while nothing limits the joints, (n, n)."""
-        return self.body if self.strips else (self.body + springs_at(self.moves, self.law.springs)).tocsr()
+        return self.segments if self.strips else (self.segments + springs_at(self.moves, self.law.springs)).tocsr()
 
 
 def whole_movements(size: int, nodes: np.ndarray, angle: np.ndarray, lever: np.ndarray | float) -> np.ndarray:
@@ -147,29 +134,24 @@ class RingForces:
         self.unslipped = np.zeros(parts.law.count)
         #: As of :meth:`structure.joint_laws.JointLaw.forces`, on the way to an equilibrium.
         self.pressed: np.ndarray | None = None
-        linear = parts.linear
-        constant = linear if self.joints.linear else parts.body
-        bolts = None if parts.bolts is None else springs_at(parts.bolts, parts.bolt_law.stiffness)
-        self.stiffness = constant
-        self.magnitudes = abs(linear if bolts is None else linear + bolts).tocsr()
-        self._push, self._force = parts.feel.T.tocsr(), parts.moves.T.tocsr()
-        rows, pairs = [sparse.csr_array((0, linear.shape[0]))], [np.zeros((0, 2), dtype=int)]
-
-        def let_change(more, within):
-            pairs.append(sum(part.shape[0] for part in rows) + within)
-            rows.append(more)
-
+        linear, bolts = parts.linear, parts.bolts
+        self.stiffness = linear if self.joints.linear else parts.segments
+        self.magnitudes = abs(linear + springs_at(bolts, parts.bolt_law.stiffness)).tocsr()
+        self._push, self._force, self._pull = (part.T.tocsr() for part in (parts.feel, parts.moves, bolts))
+        blocks = []  # of springs whose stiffness changes: rows, how many change together
         if self.springs is not None:
-            let_change(parts.feel, np.repeat(np.arange(len(parts.area))[:, None], 2, axis=1))
+            blocks.append((parts.feel, 1))
         if not self.joints.linear:
-            ways = self.joints.moves
-            first, of_joint = ways * np.arange(self.joints.count), np.stack(np.divmod(np.arange(ways**2), ways), axis=1)
-            let_change(parts.moves, (first[:, None, None] + of_joint).reshape(-1, 2))
-        if bolts is not None and not parts.bolts_reach:
-            let_change(parts.bolts, np.repeat(np.arange(parts.bolts.shape[0])[:, None], 2, axis=1))
-        symmetric, ties = self.joints.linear, parts.bolts if parts.bolts_reach else None
+            blocks.append((parts.moves, self.joints.moves))
+        blocks.append((bolts[:0] if parts.bolts_reach else bolts, 1))
+        pairs, first = [], 0
+        for rows, ways in blocks:
+            block, one, other = np.indices((rows.shape[0] // ways, ways, ways)).reshape(3, -1)
+            pairs.append(first + ways * block[:, None] + np.stack([one, other], axis=1))
+            first += rows.shape[0]
+        rows, ties = sparse.vstack([rows for rows, _ in blocks]), bolts if parts.bolts_reach else None
         self.tangent = BandedTangent(
-            constant, sparse.vstack(rows), np.concatenate(pairs), parts.place, parts.held, symmetric, ties
+            self.stiffness, rows, np.concatenate(pairs), parts.place, parts.held, self.joints.linear, ties
         )
 
     def reactions(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -199,8 +181,6 @@ class RingForces:
 
     def bolt_forces(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pull of the bolts of every joint [N/m] and its tangent [N/m2], (..., n_joints); none without bolts."""
-        if self.parts.bolts is None:
-            return np.zeros(0), np.zeros(0)
         return self.parts.bolt_law.pull((self.parts.bolts @ displacement.T).T)
 
     def internal_forces(self, displacement: np.ndarray, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -210,11 +190,8 @@ class RingForces:
             of_joints = self.joint_forces(displacement, slip)
             forces = forces + self._force @ of_joints.resisting.ravel()
             tangents.append(of_joints.tangent.ravel())
-        if self.parts.bolts is not None:
-            pull, stiffening = self.bolt_forces(displacement)
-            forces = forces + self.parts.bolts.T @ pull
-            tangents.append(stiffening)
-        return forces, np.concatenate(tangents or [np.zeros(0)])
+        pull, stiffening = self.bolt_forces(displacement)
+        return forces + self._pull @ pull, np.concatenate([*tangents, stiffening])
 
     def residual(self, displacement: np.ndarray, loads: np.ndarray, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Out-of-balance forces, zero where held, and the coefficients of the tangent."""

@@ -31,10 +31,9 @@ def paired(one: RingParts, other: RingParts, apart: sparse.csr_array, springs: n
     """
     size = one.segments.shape[0]
     held = np.concatenate([one.held, other.held + size]) if clamped else one.held
-    pairs = zip(one.bolt_law or (), other.bolt_law or (), strict=True)
 
     def both(first, second):
-        return None if first is None else sparse.block_diag([first, second], format="csr")
+        return sparse.block_diag([first, second], format="csr")
 
     def in_turn(first, second):
         """Of springs: all normal ones, then all tangential ones."""
@@ -42,10 +41,8 @@ def paired(one: RingParts, other: RingParts, apart: sparse.csr_array, springs: n
         return np.concatenate([half[k] for k in (0, 1) for half in halves])
 
     feel = both(one.feel, other.feel)[in_turn(np.arange(len(one.area)), len(one.area) + np.arange(len(other.area)))]
-    uneven, coupling = both(one.uneven, other.uneven), springs_at(apart, springs)
     parts = RingParts(
-        segments=both(one.segments, other.segments),
-        uneven=coupling if uneven is None else (uneven + coupling).tocsr(),
+        segments=(both(one.segments, other.segments) + springs_at(apart, springs)).tocsr(),
         jumps=both(one.jumps, other.jumps),
         feel=feel,
         area=in_turn(one.area, other.area),
@@ -59,9 +56,9 @@ def paired(one: RingParts, other: RingParts, apart: sparse.csr_array, springs: n
         mean=np.hstack([one.mean, other.mean]) / 2,
         arm=np.concatenate([one.arm, other.arm]),
         law=one.law.followed_by(other.law),
-        faces=both(one.faces, other.faces),
+        moves=both(one.moves, other.moves),
         bolts=both(one.bolts, other.bolts),
-        bolt_law=None if one.bolt_law is None else BoltLaw(*map(np.concatenate, pairs)),
+        bolt_law=BoltLaw(*map(np.concatenate, zip(one.bolt_law, other.bolt_law, strict=True))),
         bolts_reach=one.bolts_reach,
         strips=one.strips,
     )
@@ -71,7 +68,7 @@ def paired(one: RingParts, other: RingParts, apart: sparse.csr_array, springs: n
 def _narrow(parts):
     """Place of every unknown in a narrow band."""
     near = abs(parts.linear) + abs(parts.feel.T) @ abs(parts.feel)
-    if parts.bolts is not None and not parts.bolts_reach:
+    if not parts.bolts_reach:
         near = near + abs(parts.bolts.T) @ abs(parts.bolts)
     order = reverse_cuthill_mckee(near.tocsr(), symmetric_mode=True)
     place = np.empty(len(order), dtype=int)

@@ -67,7 +67,6 @@ def _parts(ring: Ring, mesh: RingMesh) -> RingParts:
     values = np.concatenate([np.ones(2 * mesh.n_nodes), lever])
     return RingParts(
         segments=segment_stiffness(ring, mesh),
-        uneven=None,
         jumps=jumps,
         **_joints(ring, jumps),
         feel=sparse.coo_array((values, place), shape=(2 * mesh.n_nodes, size)).tocsr(),
@@ -86,8 +85,7 @@ def _parts(ring: Ring, mesh: RingMesh) -> RingParts:
 
 def _joints(ring: Ring, jumps: sparse.csr_array) -> dict[str, Any]:
     """Laws of joints and bolts, with what they take of the unknowns: plane sections stay plane."""
-    found: dict[str, Any] = {"law": JointLaw(ring)}
-    count = len(ring.joint_angles)
+    law, moves, count = JointLaw(ring), jumps, len(ring.joint_angles)
     if ring.joint_contact == "face":
         each = joint_laws.FACE_POINTS
         joint, place = np.repeat(np.arange(count), each), (np.arange(each) + 0.5) / each - 0.5
@@ -95,11 +93,12 @@ def _joints(ring: Ring, jumps: sparse.csr_array) -> dict[str, Any]:
         points = FacePoints(joint, lever, ring.contact_heights[joint] / each)
         gap = jumps[3 * joint] + sparse.diags_array(lever) @ jumps[3 * joint + 2]
         in_turn = np.arange(2 * len(joint)).reshape(2, -1).T.ravel()
-        found |= {"law": FaceLaw(ring, points), "faces": sparse.vstack([gap, jumps[3 * joint + 1]]).tocsr()[in_turn]}
+        law, moves = FaceLaw(ring, points), sparse.vstack([gap, jumps[3 * joint + 1]]).tocsr()[in_turn]
+    bolts = jumps[:0]
     if ring.bolts:
         offset = sparse.diags_array(np.array([bolts.offset for bolts in ring.bolts]))
-        found |= {"bolts": (jumps[::3] + offset @ jumps[2::3]).tocsr(), "bolt_law": bolt_law(ring)}
-    return found
+        bolts = (jumps[::3] + offset @ jumps[2::3]).tocsr()
+    return {"law": law, "moves": moves, "bolts": bolts, "bolt_law": bolt_law(ring)}
 
 
 def _readings(ring: Ring, mesh: RingMesh) -> Readings:

@@ -148,7 +148,10 @@ class ContinuumLining(DiscreteLining):
 
     def _parts(self, ring):
         mesh, concrete, to_nodes = self.mesh, self._concrete, self._to_nodes
-        uneven = self._width == 0 and len(mesh.joint_before) > 0 and ring.joint_contact == "section"
+        jumps = tilted(_without_zeros(joint_jumps(ring, mesh) @ to_nodes), ring.tilts)
+        stiffness = (to_nodes.T @ concrete.stiffness() @ to_nodes).tocsr()
+        if self._width == 0 and len(mesh.joint_before) > 0 and ring.joint_contact == "section":
+            stiffness = stiffness + (to_nodes.T @ uneven_stiffness(ring, mesh) @ to_nodes).tocsr()
         size, first = len(mesh.node_angle), 2 * mesh.n_levels
         nodes = 2 * np.arange(size)[:, None] + np.arange(2)
         whole = whole_movements(2 * size, nodes, mesh.node_angle, 1.0)
@@ -158,9 +161,8 @@ class ContinuumLining(DiscreteLining):
         own = np.asarray(to_nodes.sum(axis=1) == 1)
         feel, area = spring_feelers(ring, mesh)
         return RingParts(
-            segments=(to_nodes.T @ concrete.stiffness() @ to_nodes).tocsr(),
-            uneven=(to_nodes.T @ uneven_stiffness(ring, mesh) @ to_nodes).tocsr() if uneven else None,
-            jumps=tilted(_without_zeros(joint_jumps(ring, mesh) @ to_nodes), ring.tilts),
+            segments=stiffness,
+            jumps=jumps,
             feel=(feel @ to_nodes).tocsr(),
             area=area,
             weight=to_nodes.T @ concrete.body_force(),
@@ -173,23 +175,19 @@ class ContinuumLining(DiscreteLining):
             mean=(whole * np.repeat(self._node_share(), 2)) @ to_nodes,
             arm=np.ones(2 * size),
             strips=self._width > 0,
-            **self._joints(ring),
+            **self._joints(ring, jumps),
         )
 
-    def _joints(self, ring) -> dict[str, Any]:
+    def _joints(self, ring, jumps) -> dict[str, Any]:
         """Laws of joints and bolts, with what they take of the unknowns."""
         mesh, to_nodes = self.mesh, self._to_nodes
-        found: dict[str, Any] = {"law": JointLaw(ring)}
+        law, moves = JointLaw(ring), jumps
         if ring.joint_contact == "face":
             points, faces = face_points(ring, mesh)
-            found = {
-                "law": FaceLaw(ring, points),
-                "faces": tilted(_without_zeros(faces @ to_nodes), ring.tilts[points.joint]),
-            }
-        if ring.bolts:
-            elongation = (bolt_elongation(ring, mesh) @ to_nodes).tocsr()
-            found |= {"bolts": elongation, "bolt_law": bolt_law(ring), "bolts_reach": True}
-        return found
+            law, moves = FaceLaw(ring, points), tilted(_without_zeros(faces @ to_nodes), ring.tilts[points.joint])
+        bolts = (bolt_elongation(ring, mesh) @ to_nodes).tocsr() if ring.bolts else jumps[:0]
+        bolted = bool(ring.bolts)
+        return {"law": law, "moves": moves, "bolts": bolts, "bolt_law": bolt_law(ring), "bolts_reach": bolted}
 
     def _held(self, ring):
         """Unknowns held at zero: the whole section next to the invert, or three that stop a free ring from drifting."""
