@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -87,7 +88,7 @@ def _segment_checks(response, limits, thickness):
     least = rule.minimum_eccentricity * np.maximum(axial, 0.0)
     moment = xr.where(moment < 0, -1.0, 1.0) * np.maximum(np.abs(moment), least)
     measure = radial_utilisation if rule.utilisation == "radial" else moment_utilisation
-    share = axial.copy(data=measure(boundary, axial.values, moment.values))
+    share = xr.apply_ufunc(partial(measure, boundary), axial, moment)
     closed = [np.append(values, values[0]) for values in boundary]
     found = {
         "design_axial_force": _described(axial, "N/m", "design axial force, compression positive"),
@@ -98,7 +99,7 @@ def _segment_checks(response, limits, thickness):
     }
     if rule.shear:
         shear = rule.moment_factor * response["shear_force"]
-        resisted = axial.copy(data=shear_resistance(limits.segment, thickness, axial.values, moment.values))
+        resisted = xr.apply_ufunc(partial(shear_resistance, limits.segment, thickness), axial, moment)
         found |= {
             "design_shear_force": _described(shear, "N/m", "design shear force, Q = -dM/ds"),
             "shear_resistance": _described(resisted, "N/m", "shear resistance without shear reinforcement"),
@@ -126,11 +127,8 @@ def _bearing_check(response, limits, ring):
         pressed, turned = pressed + pull, turned - pull * offset
     axial = rule.axial_force_factor * np.maximum(pressed, 0.0)
     moment = rule.moment_factor * turned
-    resisted = axial.copy(
-        data=bearing_resistance(
-            limits.segment, thickness, limits.joint_contact_height, axial.values, moment.values
-        )
-    )  # fmt: skip
+    resistance = partial(bearing_resistance, limits.segment, thickness, limits.joint_contact_height)
+    resisted = xr.apply_ufunc(resistance, axial, moment)
     return {
         "bearing_resistance": _described(resisted, "N/m", "resistance of the concrete under the contact zone"),
         "bearing_utilisation": _described(_share(axial, resisted), "1", "axial force in the joint over the resistance"),
@@ -139,9 +137,8 @@ def _bearing_check(response, limits, ring):
 
 def _crack_check(response, limits, thickness):
     axial, moment = response["axial_force"], response["bending_moment"]
-    width = axial.copy(
-        data=crack_width(limits.segment, thickness, axial.values, moment.values, limits.crack_duration)
-    )  # fmt: skip
+    opening = partial(crack_width, limits.segment, thickness, duration=limits.crack_duration)
+    width = xr.apply_ufunc(opening, axial, moment)
     return {
         "crack_width": _described(width, "m", f"crack width, {limits.crack_duration} load"),
         "crack_utilisation": _described(width / limits.crack_width, "1", "crack width over its limit"),
