@@ -150,18 +150,14 @@ def _angles(theta):
 
 def _around_the_ring(found):
     """Without an angle that stands there twice with the same values; complete around the ring."""
-    import xarray as xr
-
-    theta = found["theta"].values
-    twice = np.flatnonzero(np.diff(theta) == 0)
-    for k in twice:
-        one, other = (found[list(PRESSURES)].isel(theta=j, drop=True) for j in (k, k + 1))
-        if not one.drop_vars("theta", errors="ignore").equals(other.drop_vars("theta", errors="ignore")):
-            raise ValueError(
-                f"pressures: theta must hold every angle once, got {theta[k]:g} degrees twice with different values; "
-                "drop one of them"
-            )
-    found = found.isel(theta=np.setdiff1d(np.arange(len(theta)), twice + 1))
+    again = np.diff(found["theta"].values, prepend=np.nan) == 0
+    differ = np.any([(found[name] != found[name].shift(theta=1)).any("time") for name in PRESSURES], axis=0)
+    if (again & differ).any():
+        raise ValueError(
+            f"pressures: theta must hold every angle once, got {found['theta'].values[again & differ][0]:g} degrees"
+            " twice with different values; drop one of them"
+        )
+    found = found.isel(theta=~again)
     theta = found["theta"].values
     if len(theta) < FEWEST_ANGLES:
         raise ValueError(
@@ -178,7 +174,7 @@ def _around_the_ring(found):
             f"pressures: theta must leave no gap of more than {WIDEST_GAP:g} degrees, got {gaps[k]:.4g} after "
             f"{theta[k]:g} degrees; add angles there, or {hint}"
         )
-    return found if isinstance(found, xr.Dataset) else xr.Dataset(found)
+    return found
 
 
 def _warn_of_size(found, ring):
