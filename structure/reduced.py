@@ -13,6 +13,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from structure.arcs import periodic_shares
 from structure.discrete import DiscreteLining
 from structure.inputs import InputError
 from structure.lining import THETA
@@ -119,11 +120,10 @@ class ReducedRing:
         return result
 
     def _on_face(self, theta):
-        place = (theta % (2 * np.pi)) / FACE[1]
-        first = np.floor(place).astype(int)
-        share, first = (place - first)[:, None], first % len(FACE)
-        second = (first + 1) % len(FACE)
-        return tuple((1 - share) * part[first] + share * part[second] for part in (self._outward, self._clockwise))
+        (first, second), (near, far) = periodic_shares(FACE, theta)
+        return tuple(
+            near[:, None] * part[first] + far[:, None] * part[second] for part in (self._outward, self._clockwise)
+        )
 
     def joint_forces(self, moved: np.ndarray, slip: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Forces that joints and bolts resist with, their tangent, and the slips then: (n,), (n, n), (n_joints,).
