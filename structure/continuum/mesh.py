@@ -217,20 +217,16 @@ class ContinuumMesh:
         )
 
     def locate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Column of each angle [rad], and the place in it from 0 to 1.
+        """Column of each angle [rad], and the place in it from 0 to 1, beyond 1 in the gate.
 
-        Columns are -1 in the gate. On a zero-thickness joint one of its sides is taken.
+        Columns are -1 there. On a zero-thickness joint one of its sides is taken.
         """
         edges = self.column_angles()
         begin, span = edges[:, 0], edges[:, 2] - edges[:, 0]
-        column = np.full(len(theta), -1)
-        place = np.zeros(len(theta))
-        for index, angle in enumerate(theta):
-            share = ((angle - begin + 1e-9) % (2 * np.pi) - 1e-9) / span
-            best = int(np.argmin(np.abs(share - 0.5)))
-            if share[best] <= 1 + 1e-6:
-                column[index], place[index] = best, share[best]
-        return column, place
+        shares = ((theta[:, None] - begin + 1e-9) % (2 * np.pi) - 1e-9) / span
+        column = np.argmin(np.abs(shares - 0.5), axis=1)
+        place = shares[np.arange(len(theta)), column]
+        return np.where(place <= 1 + 1e-6, column, -1), place
 
 
 def _layer_edges(ring: Ring, layers: int, groove: GasketGroove | None) -> np.ndarray:
