@@ -5,8 +5,8 @@ from __future__ import annotations
 import difflib
 import runpy
 from collections.abc import Iterable
-from importlib import import_module
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -58,8 +58,7 @@ def lining_model(name: str) -> type[LiningModel]:
     if name in _REGISTERED:
         return _REGISTERED[name]
     if name in _BUILT_IN:
-        module, attribute = _BUILT_IN[name].split(":")
-        return getattr(import_module(module), attribute)
+        return resolve_name(_BUILT_IN[name])
     for entry in _installed():
         if entry.name == name:
             return entry.load()
