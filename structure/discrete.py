@@ -47,9 +47,9 @@ class Readings(NamedTuple):
     movement: tuple[sparse.csr_array, sparse.csr_array]
     quarters: sparse.csr_array
     spring_angle: np.ndarray
-    lined: np.ndarray
-    near_force: np.ndarray
-    weight_offset: float
+    lined: np.ndarray = np.ones(len(THETA))
+    near_force: np.ndarray = np.zeros(len(THETA), dtype=bool)
+    weight_offset: float = 0.0
     bolt_shares: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
 
 

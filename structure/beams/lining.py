@@ -111,7 +111,4 @@ def _readings(ring: Ring, mesh: RingMesh) -> Readings:
         movement=movement,
         quarters=movement[0][:: len(THETA) // 4],
         spring_angle=mesh.node_angle,
-        lined=np.ones(len(THETA)),
-        near_force=np.zeros(len(THETA), dtype=bool),
-        weight_offset=0.0,
     )
