@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from structure.beams.lining import BeamSpringLining
+    from structure.bolts import Bolts
     from structure.checks import check
     from structure.continuum.lining import ContinuumLining
     from structure.continuum.mesh import GasketGroove, Gate
@@ -16,14 +17,16 @@ if TYPE_CHECKING:
     from structure.lining import LiningFailure, LiningModel, additional
     from structure.models import lining_model, lining_model_names, register_lining_model
     from structure.passing import utilisations
-    from structure.ring import Bolts, Ground, Neighbour, Ring
+    from structure.ring import Neighbour, Ring
     from structure.segment import SegmentSection
+    from structure.springs import Ground
     from structure.theory import theoretical_pressures
 
     __version__: str
 
 _MODULES = {
     "beams.lining": ["BeamSpringLining"],
+    "bolts": ["Bolts"],
     "checks": ["check"],
     "continuum.lining": ["ContinuumLining"],
     "continuum.mesh": ["GasketGroove", "Gate"],
@@ -32,8 +35,9 @@ _MODULES = {
     "lining": ["LiningFailure", "LiningModel", "additional"],
     "models": ["lining_model", "lining_model_names", "register_lining_model"],
     "passing": ["utilisations"],
-    "ring": ["Bolts", "Ground", "Neighbour", "Ring"],
+    "ring": ["Neighbour", "Ring"],
     "segment": ["SegmentSection"],
+    "springs": ["Ground"],
     "theory": ["theoretical_pressures"],
 }
 _HOMES = {name: f"structure.{module}" for module, names in _MODULES.items() for name in names}

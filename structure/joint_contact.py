@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+#: Share of the stiffness of joint or segment, whichever is less, kept in the *tangent* only of a joint that is open,
+#: sliding or nearly hinged: the ring stays factorisable, and convergence slows by no more than this factor a step.
+TANGENT_FLOOR = 1e-6
 #: Of Newton's method for a rotation, and the relative change at which it stops.
 MAX_STEPS, CLOSE = 60, 1e-8
 

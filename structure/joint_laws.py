@@ -8,16 +8,15 @@ Signs as in :mod:`structure.response`; everything per metre of tunnel.
 from __future__ import annotations
 
 import copy
-from typing import NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
-from structure.joint_contact import contact_moment, gaping_rotation, limited_shear
-from structure.ring import Ring
+from structure.joint_contact import TANGENT_FLOOR, contact_moment, gaping_rotation, limited_shear
 
-#: Share of the stiffness of joint or segment, whichever is less, kept in the *tangent* only of a joint that is open,
-#: sliding or nearly hinged: the ring stays factorisable, and convergence slows by no more than this factor a step.
-TANGENT_FLOOR = 1e-6
+if TYPE_CHECKING:
+    from structure.ring import Ring
+
 #: Points of a face where a joint touches along it.
 FACE_POINTS = 40
 
@@ -233,32 +232,3 @@ class FaceLaw(ContactLaw):
             return gaps, ""
         slides = np.abs(forces.shear[here]) >= self.friction[here] * forces.axial[here]
         return gaps, "sliding" if slides[~apart].all() else ""
-
-
-class BoltLaw(NamedTuple):
-    """Bolts across the joints, as of :class:`structure.ring.Bolts`: they pull once their slack is used up.
-
-    stiffness [N/m2], slack [m], preload [N/m] : (n_joints,) float64 each.
-    """
-
-    stiffness: np.ndarray
-    slack: np.ndarray
-    preload: np.ndarray
-
-    def pull(self, elongation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Force [N/m] and its derivative [N/m2] at elongations (..., n_joints) [m]."""
-        force = self.preload + self.stiffness * (elongation - self.slack)
-        return np.maximum(force, 0.0), np.where(force > 0, self.stiffness, TANGENT_FLOOR * self.stiffness)
-
-    def between(self, both: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
-        """Elongations (n_joints,) [m] at which pull plus `stiffness` times elongation is `both`."""
-        loose = both / stiffness
-        pulls = self.preload + self.stiffness * (loose - self.slack) > 0
-        tight = (both - self.preload + self.stiffness * self.slack) / (self.stiffness + stiffness)
-        return np.where(pulls, tight, loose)
-
-
-def bolt_law(ring: Ring) -> BoltLaw:
-    """That of the bolts of a ring, of none where it has none."""
-    stated = [(bolts.stiffness, bolts.slack, bolts.preload) for bolts in ring.bolts]
-    return BoltLaw(*np.reshape(stated, (-1, 3)).T)

@@ -8,102 +8,15 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from structure.bolts import Bolts
 from structure.inputs import Input, InputError, OneOrSeveral
-from structure.plausibility import GROUND, RING, Usual, joints_in_radians
+from structure.joint_rules import PER_JOINT, check_joints
+from structure.plausibility import RING, Usual, joints_in_radians
+from structure.springs import Ground
 
-
-class Ground(Input):
-    """Soil around the ring, as the soil springs see it.
-
-    Parameters
-    ----------
-    youngs_modulus : float
-        [Pa]. Decides the initial spring stiffness, Eq. (8).
-    poissons_ratio : float
-        [-], 0 to below 0.5.
-    cohesion : float
-        Effective cohesion [Pa].
-    friction_angle : float
-        [degree].
-    vertical_stress, horizontal_stress : float
-        Effective stresses at the depth of the axis [Pa], compression positive. Decide the limit pressures.
-    limit_pressure_normal, limit_pressure_tangential : float, optional
-        Limit of the springs' reaction [Pa]; given, they replace the formula
-        (:func:`structure.springs.limit_pressures`).
-    tangential_springs : bool
-        Whether the soil resists sliding with a third of the normal stiffness.
-    slip_at : {"outer_face", "centre_line"}
-        Where the tangential springs take hold. "outer_face": where the soil is; a rotating section slips there too,
-        and the reaction brings a couple. "centre_line": at the beam nodes, as load-structure programs usually do.
-    law : {"hyperbolic", "linear"}
-        Reaction over displacement: Eq. (7), or its initial tangent without a limit.
-    two_way : bool
-        Whether normal springs also pull. Off by default: a two-way spring pulls a shrinking ring outward.
-    """
-
-    usual: ClassVar[Usual] = GROUND
-
-    youngs_modulus: float = Field(gt=0)
-    poissons_ratio: float = Field(ge=0, lt=0.5)
-    cohesion: float = Field(ge=0)
-    friction_angle: float = Field(ge=0, lt=90)
-    vertical_stress: float = Field(ge=0)
-    horizontal_stress: float = Field(ge=0)
-    limit_pressure_normal: float | None = Field(default=None, ge=0)
-    limit_pressure_tangential: float | None = Field(default=None, ge=0)
-    tangential_springs: bool = True
-    slip_at: Literal["outer_face", "centre_line"] = "outer_face"
-    law: Literal["hyperbolic", "linear"] = "hyperbolic"
-    two_way: bool = False
-
-
-#: What may be stated for every joint by its own.
-PER_JOINT = (
-    "joint_rotational_stiffness", "joint_normal_stiffness", "joint_shear_stiffness", "joint_contact_height",
-    "joint_friction_coefficient", "joint_inclinations", "joint_bolts",
-)  # fmt: skip
-#: [degree]
-STEEPEST_JOINT = 45.0
 #: One number for all joints, or one for each.
 NotNegative = OneOrSeveral[Annotated[float, Field(ge=0)]]
 Positive = OneOrSeveral[Annotated[float, Field(gt=0)]]
-
-
-class Bolts(Input):
-    """Straight bolts across a joint, square to it, besides the joint's own springs; they pull and never press.
-
-    Their force per metre of tunnel is max(0, preload + stiffness (elongation - slack)). A preload presses the segments
-    together before any load: the undeformed ring is that before the bolts are tightened.
-
-    Parameters
-    ----------
-    offset : float
-        Where they cross the joint, outward from the centre line [m].
-    length : float
-        Between their anchors [m]. The beams see the bolts in the section of the joint; the continuum anchors them in
-        the concrete.
-    stiffness : float
-        EA/length of all of them [N/m per metre of tunnel]; 0 for a joint without.
-    slack : float
-        Elongation before they begin to pull [m].
-    preload : float
-        Force to which they were tightened [N per metre of tunnel]; without slack.
-    """
-
-    offset: float
-    length: float = Field(gt=0)
-    stiffness: float = Field(ge=0)
-    slack: float = Field(default=0.0, ge=0)
-    preload: float = Field(default=0.0, ge=0)
-
-    @model_validator(mode="after")
-    def _check(self) -> Bolts:
-        if self.slack and self.preload:
-            raise ValueError(
-                f"slack must be 0 where there is a preload of {self.preload:g} N/m, got {self.slack:g} m; bolts that"
-                " are tightened have none"
-            )
-        return self
 
 
 class Neighbour(Input):
@@ -218,16 +131,7 @@ class Ring(Input):
                 f"inner_diameter must be below outer_diameter {self.outer_diameter:g} m, got {self.inner_diameter:g} m;"
                 " swap them if they were exchanged"
             )
-        for angle in self.joint_angles:
-            if not 0 <= angle < 360:
-                raise ValueError(f"joint_angles must lie in [0, 360) degrees, got {angle:g}; add or subtract 360")
-        smallest = 2 * 360 / self.n_elements
-        if list(self.joint_angles) != sorted(self.joint_angles) or min(self.segment_angles) < smallest:
-            raise ValueError(
-                f"joint_angles must increase by at least two elements ({smallest:g} degrees), got {self.joint_angles};"
-                " sort them, or raise n_elements"
-            )
-        self._check_joints()
+        check_joints(self)
         if self.neighbour is not None and not self.joint_angles:
             raise ValueError("neighbour: must be left out of a ring without joints, got one; all rings are alike")
         if self.support != "free" and self.ground is not None:
@@ -239,80 +143,6 @@ class Ring(Input):
         radians = joints_in_radians(self.joint_angles)
         return super().unusual() | ({"joint_angles": radians} if radians else {})
 
-    def _check_joints(self):
-        stiffnesses = {"joint_rotational_stiffness", "joint_normal_stiffness", "joint_shear_stiffness"}
-        if self.joint_contact == "face":
-            stiffnesses -= {"joint_rotational_stiffness"}
-        missing = sorted(stiffnesses - self.model_fields_set)
-        if self.joint_angles and missing:
-            raise ValueError(f"joints need {', '.join(missing)}, got none; state them, 0 for a free hinge")
-        count = len(self.joint_angles)
-        for name in PER_JOINT:
-            given = getattr(self, name)
-            if isinstance(given, tuple) and (given or name != "joint_inclinations") and len(given) != count:
-                raise ValueError(
-                    f"{name} must be one for all joints or {count}, one for each, got {len(given)}; give it in the"
-                    " order of joint_angles"
-                )
-        height = 0.0 if self.joint_contact_height is None else self.per_joint("joint_contact_height").max(initial=0.0)
-        if height > self.thickness * (1 + 1e-9):
-            raise ValueError(
-                f"joint_contact_height must not exceed the thickness {self.thickness:g} m, got {height:g} m; give the"
-                " height over which the segments touch"
-            )
-        steepest = max(map(abs, self.joint_inclinations), default=0.0)
-        if steepest > STEEPEST_JOINT:
-            raise ValueError(
-                f"joint_inclinations must lie within {STEEPEST_JOINT:g} degrees of the radius, got {steepest:g}; the"
-                " joint of a plane ring stands across the segment"
-            )
-        self._check_joint_laws()
-        self._check_bolts()
-
-    def _check_joint_laws(self):
-        needs = {"joint_contact_height": ("joint_rotational_stiffness", "joint_normal_stiffness")}
-        needs["joint_friction_coefficient"] = ("joint_shear_stiffness", "joint_normal_stiffness")
-        if self.joint_contact == "face":
-            needs["joint_contact_height"] = ("joint_normal_stiffness",)
-            self._check_face()
-        for name, stiffnesses in needs.items():
-            for stiffness in stiffnesses if getattr(self, name) is not None and self.joint_angles else ():
-                if (self.per_joint(stiffness) == 0).any():
-                    raise ValueError(
-                        f"{stiffness} must be above 0 where {name} is given, got 0; this law limits the force of that"
-                        f" spring by the axial force in the joint: leave {name} out"
-                    )
-
-    def _check_face(self):
-        if not self.joint_angles:
-            raise ValueError("joint_contact must be 'section' where there are no joints, got 'face'; leave it out")
-        normal = self.per_joint("joint_normal_stiffness")
-        if (normal == 0).any():
-            raise ValueError(
-                "joint_normal_stiffness must be above 0 where joint_contact is 'face', got 0; faces that touch press"
-            )
-        turning = self._face_turning
-        given = self.per_joint("joint_rotational_stiffness")
-        if "joint_rotational_stiffness" in self.model_fields_set and (np.abs(given - turning) > 0.01 * turning).any():
-            worst = int(np.argmax(np.abs(given / turning - 1)))
-            raise ValueError(
-                f"joint_rotational_stiffness must be k_n h^2/12 = {turning[worst]:.4g} N m/rad where joint_contact is"
-                f" 'face', got {given[worst]:.4g} at joint {worst + 1}; leave it out, or give the"
-                f" joint_normal_stiffness {12 * given[worst] / self.contact_heights[worst] ** 2:.4g} N/m that turns so"
-            )
-
-    def _check_bolts(self):
-        if self.joint_bolts is None:
-            return
-        if not self.joint_angles:
-            raise ValueError("joint_bolts: the ring must have joints, got none; leave bolts out, or give joint_angles")
-        for bolts in self.bolts:
-            if not abs(bolts.offset) < self.thickness / 2:
-                raise ValueError(
-                    f"joint_bolts: offset must lie within half the thickness {self.thickness / 2:g} m, got"
-                    f" {bolts.offset:g} m; it counts outward from the centre line"
-                )
-
     def per_joint(self, name: str) -> np.ndarray:
         """Of every joint, (n_joints,) float64, what "joint_normal_stiffness", say, states for all or for each."""
         return np.broadcast_to(np.asarray(getattr(self, name), dtype=float), len(self.joint_angles))
@@ -323,10 +153,11 @@ class Ring(Input):
         normal, shear, turning = map(
             self.per_joint, ("joint_normal_stiffness", "joint_shear_stiffness", "joint_rotational_stiffness")
         )
-        return np.stack([normal, shear, self._face_turning if self.joint_contact == "face" else turning], axis=1)
+        return np.stack([normal, shear, self.face_turning if self.joint_contact == "face" else turning], axis=1)
 
     @property
-    def _face_turning(self):
+    def face_turning(self) -> np.ndarray:
+        """Stiffness k_n h^2/12 by which springs spread over its faces turn every joint, (n_joints,) [N m/rad]."""
         return self.per_joint("joint_normal_stiffness") * self.contact_heights**2 / 12
 
     @property

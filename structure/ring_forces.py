@@ -8,7 +8,8 @@ import numpy as np
 from scipy import sparse
 
 from structure.banded import BandedTangent
-from structure.joint_laws import BoltLaw, FaceLaw, JointForces, JointLaw
+from structure.bolts import BoltLaw
+from structure.joint_laws import FaceLaw, JointForces, JointLaw
 from structure.ring import Ring
 from structure.springs import soil_reaction, soil_springs
 

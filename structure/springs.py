@@ -1,16 +1,66 @@
-"""The law of the soil springs: reaction over displacement, with its limit and tangent."""
+"""The soil around a ring and the law of its springs: reaction over displacement, with its limit and tangent."""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
-from structure.ring import Ground, Ring
+from structure.inputs import Input
+from structure.plausibility import GROUND, Usual
+
+if TYPE_CHECKING:
+    from structure.ring import Ring
 
 #: Ratio of tangential to normal stiffness, stated with Eq. (8) by Xie et al.
 TANGENTIAL_TO_NORMAL = 1 / 3
+
+
+class Ground(Input):
+    """Soil around the ring, as the soil springs see it.
+
+    Parameters
+    ----------
+    youngs_modulus : float
+        [Pa]. Decides the initial spring stiffness, Eq. (8).
+    poissons_ratio : float
+        [-], 0 to below 0.5.
+    cohesion : float
+        Effective cohesion [Pa].
+    friction_angle : float
+        [degree].
+    vertical_stress, horizontal_stress : float
+        Effective stresses at the depth of the axis [Pa], compression positive. Decide the limit pressures.
+    limit_pressure_normal, limit_pressure_tangential : float, optional
+        Limit of the springs' reaction [Pa]; given, they replace the formula
+        (:func:`structure.springs.limit_pressures`).
+    tangential_springs : bool
+        Whether the soil resists sliding with a third of the normal stiffness.
+    slip_at : {"outer_face", "centre_line"}
+        Where the tangential springs take hold. "outer_face": where the soil is; a rotating section slips there too,
+        and the reaction brings a couple. "centre_line": at the beam nodes, as load-structure programs usually do.
+    law : {"hyperbolic", "linear"}
+        Reaction over displacement: Eq. (7), or its initial tangent without a limit.
+    two_way : bool
+        Whether normal springs also pull. Off by default: a two-way spring pulls a shrinking ring outward.
+    """
+
+    usual: ClassVar[Usual] = GROUND
+
+    youngs_modulus: float = Field(gt=0)
+    poissons_ratio: float = Field(ge=0, lt=0.5)
+    cohesion: float = Field(ge=0)
+    friction_angle: float = Field(ge=0, lt=90)
+    vertical_stress: float = Field(ge=0)
+    horizontal_stress: float = Field(ge=0)
+    limit_pressure_normal: float | None = Field(default=None, ge=0)
+    limit_pressure_tangential: float | None = Field(default=None, ge=0)
+    tangential_springs: bool = True
+    slip_at: Literal["outer_face", "centre_line"] = "outer_face"
+    law: Literal["hyperbolic", "linear"] = "hyperbolic"
+    two_way: bool = False
 
 
 class SoilSpring(NamedTuple):

@@ -6,7 +6,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from structure.joint_laws import BoltLaw
+from structure.bolts import BoltLaw
 from structure.ring import Neighbour
 from structure.ring_forces import RingParts, springs_at
 

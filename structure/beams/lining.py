@@ -18,8 +18,9 @@ from structure.beams.elements import (
     traction_operator,
 )
 from structure.beams.mesh import RingMesh, displacements_at, forces_at
+from structure.bolts import bolt_law
 from structure.discrete import SIDES, DiscreteLining, Readings
-from structure.joint_laws import FaceLaw, FacePoints, JointLaw, bolt_law
+from structure.joint_laws import FaceLaw, FacePoints, JointLaw
 from structure.lining import THETA
 from structure.ring import Ring, alone, check_ring
 from structure.ring_forces import RingParts, tilted, whole_movements

@@ -9,6 +9,7 @@ import xarray as xr
 from scipy import sparse
 
 from structure.banded import folded
+from structure.bolts import bolt_law
 from structure.continuum.bolts import anchor_places, bolt_elongation, bolt_shares, check_anchors, near_anchors
 from structure.continuum.concrete import Concrete
 from structure.continuum.face import spring_feelers, traction_operator
@@ -16,7 +17,7 @@ from structure.continuum.joints import face_points, joint_jumps, nodes_from_unkn
 from structure.continuum.mesh import EDGE_MEAN, ContinuumMesh, GasketGroove, Gate
 from structure.continuum.sections import section_displacements, section_forces
 from structure.discrete import SIDES, DiscreteLining, Readings, one_thread
-from structure.joint_laws import FaceLaw, JointLaw, bolt_law
+from structure.joint_laws import FaceLaw, JointLaw
 from structure.lining import THETA, origin
 from structure.pressures import check_pressures
 from structure.response import FORCES, described
