@@ -56,10 +56,8 @@ def check_pressures(pressures: xr.Dataset, ring: Ring | None = None) -> xr.Datas
     found = pressures[kept].assign_coords(time=_time(pressures["time"]), theta=_angles(pressures["theta"]))
     for name in PRESSURES:
         variable = found[name]
-        values = _in_unit(variable.values, str(variable.attrs.get("units", "Pa")), "Pa", name)
-        bad = int((~np.isfinite(values)).sum())
-        if bad:
-            raise ValueError(f"pressures: {name} must be finite, got {bad} values that are not; drop those times")
+        units = str(variable.attrs.get("units", "Pa"))
+        values = _in_unit(variable.values, units, "Pa", name, "values that are not; drop those times")
         found[name] = variable.copy(data=values).assign_attrs(units="Pa").transpose("time", "theta")
     found = _around_the_ring(found.sortby("theta"))
     _warn_of_size(found, ring)
@@ -102,13 +100,8 @@ def _time(time):
         about |= {"long_name": "time since the first record", "time_origin": str(values[0])}
         values = values - values[0]
     if values.dtype.kind == "m":
-        missing = np.isnat(values)
-        values, units = np.where(missing, np.nan, values / np.timedelta64(1, "ns") * 1e-9), "s"
-    values = _in_unit(values, units, "s", "time")
-    if not np.isfinite(values).all():
-        raise ValueError(
-            f"pressures: time must be finite, got {int((~np.isfinite(values)).sum())} values that are not; drop them"
-        )
+        values, units = values / np.timedelta64(1, "ns") * 1e-9, "s"
+    values = _in_unit(values, units, "s", "time", "values that are not; drop them")
     if np.any(np.diff(values) <= 0):
         k = int(np.argmax(np.diff(values) <= 0))
         raise ValueError(
@@ -130,12 +123,8 @@ def _dates(values, units, calendar):
 
 def _angles(theta):
     """The coordinate in degrees in [0, 360), in the order given."""
-    values = _in_unit(theta.values, str(theta.attrs.get("units", "degree")), "degree", "theta")
-    bad = int((~np.isfinite(values)).sum())
-    if bad:
-        raise ValueError(
-            f"pressures: theta must be finite, got {bad} angles that are not; drop them, with their values"
-        )
+    units, rest = str(theta.attrs.get("units", "degree")), "angles that are not; drop them, with their values"
+    values = _in_unit(theta.values, units, "degree", "theta", rest)
     if values is not theta.values:  # of 2 pi rad, say, a last digit may be left
         values = np.round(values, 10)
     about = {"units": "degree", "long_name": "angle from the crown, clockwise"}
@@ -251,23 +240,30 @@ _UNIT = r"[^\W\d]+(?:(?:\*\*|\^)-?[0-9])?"
 UNITS = re.compile(rf"1|(?:1 */ *)?\(?{_UNIT}(?: *[*/.] *\(?{_UNIT}\)?){{0,8}}")
 
 
-def _in_unit(values, units, wanted, name):
-    """Values as float64 in another unit."""
+def _in_unit(values, units, wanted, name, rest):
+    """Values as finite float64 in another unit; `rest` says what those that are not finite are, and the remedy."""
     try:
         numbers = np.asarray(values, dtype=float)
     except (TypeError, ValueError):
         raise ValueError(f"pressures: {name} must be numbers in {wanted}, got {values.dtype}; convert them") from None
-    if units in (wanted, f"{wanted}s"):
-        return numbers
+    if units not in (wanted, f"{wanted}s"):
+        numbers = numbers * _factor(units, wanted, name)
+    bad = int((~np.isfinite(numbers)).sum())
+    if bad:
+        raise ValueError(f"pressures: {name} must be finite, got {bad} {rest}")
+    return numbers
+
+
+def _factor(units, wanted, name):
+    """From one unit to the other."""
     # CF writes N m-2
     text = re.sub(r"([a-zA-Z])(-?[0-9])", r"\1**\2", SPELLINGS.get(units.strip(), units.strip()))
     text = re.sub(r"(?<=[\w)])\s+(?=[a-zA-Z])", "*", text)
     try:
         if not UNITS.fullmatch(text):
             raise ValueError("no unit")
-        factor = _registry().Quantity(1.0, text).to(wanted).magnitude
+        return _registry().Quantity(1.0, text).to(wanted).magnitude
     except Exception:
         raise ValueError(
             f"pressures: {name} must be in {wanted}, got {shortened(units)}; convert it, or correct its units"
         ) from None
-    return numbers * factor
