@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy import sparse
 
-from structure.banded import Mechanism, softest_motion
+from structure.banded import BandedTangent, Mechanism, softest_motion
 from structure.ring import Ring
-from structure.ring_forces import RingForces, RingParts
+from structure.ring_forces import RingForces, RingParts, springs_at
 
 #: Out-of-balance force on an unknown over the sum of all loads at which Newton stops.
 RESIDUAL_TOLERANCE = 1e-11
@@ -49,10 +50,31 @@ class RingEquilibrium(RingForces):
 
     def __init__(self, ring: Ring, parts: RingParts):
         super().__init__(ring, parts)
+        self.magnitudes = abs(parts.linear + springs_at(parts.bolts, parts.bolt_law.stiffness)).tocsr()
+        self.tangent = self._tangent()
         self.largest = LARGEST_DISPLACEMENT * ring.outer_radius
         self.iterations: list[int] = []
         self.residuals: list[float] = []
         self.loose = self._mechanism() if ring.ground is None else ""
+
+    def _tangent(self) -> BandedTangent:
+        """That of all forces, with a coefficient for every spring, joint and bolt whose stiffness changes."""
+        parts, bolts = self.parts, self.parts.bolts
+        blocks = []  # of springs whose stiffness changes: rows, how many change together
+        if self.springs is not None:
+            blocks.append((parts.feel, 1))
+        if not self.joints.linear:
+            blocks.append((parts.moves, self.joints.moves))
+        blocks.append((bolts[:0] if parts.bolts_reach else bolts, 1))
+        pairs, first = [], 0
+        for rows, ways in blocks:
+            block, one, other = np.indices((rows.shape[0] // ways, ways, ways)).reshape(3, -1)
+            pairs.append(first + ways * block[:, None] + np.stack([one, other], axis=1))
+            first += rows.shape[0]
+        rows, ties = sparse.vstack([rows for rows, _ in blocks]), bolts if parts.bolts_reach else None
+        return BandedTangent(
+            self.stiffness, rows, np.concatenate(pairs), parts.place, parts.held, self.joints.linear, ties
+        )
 
     def _mechanism(self) -> str:
         """How the undeformed ring can move without resistance, empty where it cannot.

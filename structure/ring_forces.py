@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from structure.banded import BandedTangent
 from structure.bolts import BoltLaw
 from structure.joint_laws import FaceLaw, JointForces, JointLaw
 from structure.ring import Ring
@@ -129,31 +128,14 @@ class RingForces:
     """
 
     def __init__(self, ring: Ring, parts: RingParts):
-        self.ring, self.parts, self.held = ring, parts, parts.held
+        self.ring, self.parts = ring, parts
         self.springs = soil_springs(ring) if ring.ground is not None else None
         self.joints = parts.law
         self.unslipped = np.zeros(parts.law.count)
         #: As of :meth:`structure.joint_laws.JointLaw.forces`, on the way to an equilibrium.
         self.pressed: np.ndarray | None = None
-        linear, bolts = parts.linear, parts.bolts
-        self.stiffness = linear if self.joints.linear else parts.segments
-        self.magnitudes = abs(linear + springs_at(bolts, parts.bolt_law.stiffness)).tocsr()
-        self._push, self._force, self._pull = (part.T.tocsr() for part in (parts.feel, parts.moves, bolts))
-        blocks = []  # of springs whose stiffness changes: rows, how many change together
-        if self.springs is not None:
-            blocks.append((parts.feel, 1))
-        if not self.joints.linear:
-            blocks.append((parts.moves, self.joints.moves))
-        blocks.append((bolts[:0] if parts.bolts_reach else bolts, 1))
-        pairs, first = [], 0
-        for rows, ways in blocks:
-            block, one, other = np.indices((rows.shape[0] // ways, ways, ways)).reshape(3, -1)
-            pairs.append(first + ways * block[:, None] + np.stack([one, other], axis=1))
-            first += rows.shape[0]
-        rows, ties = sparse.vstack([rows for rows, _ in blocks]), bolts if parts.bolts_reach else None
-        self.tangent = BandedTangent(
-            self.stiffness, rows, np.concatenate(pairs), parts.place, parts.held, self.joints.linear, ties
-        )
+        self.stiffness = parts.linear if self.joints.linear else parts.segments
+        self._push, self._force, self._pull = (part.T.tocsr() for part in (parts.feel, parts.moves, parts.bolts))
 
     def reactions(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Reaction of the soil [Pa] and its tangent [Pa/m] at every spring, (n_springs,); none without ground."""
@@ -199,7 +181,7 @@ class RingForces:
         reactions, stiffening = self.reactions(displacement)
         internal, inside = self.internal_forces(displacement, slip)
         out_of_balance = loads + self.spring_forces(reactions) - internal
-        out_of_balance[self.held] = 0
+        out_of_balance[self.parts.held] = 0
         return out_of_balance, np.concatenate([self.parts.area[: len(stiffening)] * stiffening, inside])
 
     def sizes(self, vectors: np.ndarray) -> np.ndarray:
