@@ -140,16 +140,19 @@ class JointLaw(ContactLaw):
     ----------
     ring : Ring
         Its ``joint_contact_only``, ``joint_contact_height`` and ``joint_friction_coefficient`` choose the law.
+    resists : bool
+        False: springs of no stiffness, of joints that are soft material, part of the segments.
     """
 
-    def __init__(self, ring: Ring):
+    def __init__(self, ring: Ring, resists: bool = True):
         along, across = ring.axial_stiffness / ring.centre_radius, ring.bending_stiffness / ring.centre_radius
         height, friction = (
             None if getattr(ring, name) is None else ring.per_joint(name)
             for name in ("joint_contact_height", "joint_friction_coefficient")
         )
-        floors = TANGENT_FLOOR * np.minimum(ring.joint_springs, [along, along, across])
-        super().__init__(ring.joint_springs, floors, ring.joint_contact_only, height, friction)
+        springs = ring.joint_springs * resists
+        floors = TANGENT_FLOOR * np.minimum(springs, [along, along, across])
+        super().__init__(springs, floors, ring.joint_contact_only, height, friction)
 
     def between(self, both: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
         """Movements (n_joints, 3) at which forces plus `stiffness` times movements are `both`, of unslipped joints."""

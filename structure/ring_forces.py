@@ -52,8 +52,6 @@ class RingParts(NamedTuple):
         Elongation of the bolts of every joint; no rows without bolts.
     bolts_reach : bool
         Whether they join places far apart, which would widen the band.
-    strips : bool
-        Whether the joints are soft material, part of the segments.
     """
 
     segments: sparse.csr_array
@@ -74,12 +72,11 @@ class RingParts(NamedTuple):
     bolts: sparse.csr_array
     bolt_law: BoltLaw
     bolts_reach: bool = False
-    strips: bool = False
 
     @property
     def linear(self) -> sparse.csr_array:
         """Stiffness of all but bolts while nothing limits the joints, (n, n)."""
-        return self.segments if self.strips else (self.segments + springs_at(self.moves, self.law.springs)).tocsr()
+        return (self.segments + springs_at(self.moves, self.law.springs)).tocsr()
 
 
 def whole_movements(size: int, nodes: np.ndarray, angle: np.ndarray, lever: np.ndarray | float) -> np.ndarray:

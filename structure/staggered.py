@@ -60,7 +60,6 @@ def paired(one: RingParts, other: RingParts, apart: sparse.csr_array, springs: n
         bolts=both(one.bolts, other.bolts),
         bolt_law=BoltLaw(*map(np.concatenate, zip(one.bolt_law, other.bolt_law, strict=True))),
         bolts_reach=one.bolts_reach,
-        strips=one.strips,
     )
     return parts._replace(place=_narrow(parts))
 

@@ -175,14 +175,14 @@ class ContinuumLining(DiscreteLining):
             rigid=rigid * own,
             mean=(whole * np.repeat(self._node_share(), 2)) @ to_nodes,
             arm=np.ones(2 * size),
-            strips=self._width > 0,
             **self._joints(ring, jumps),
         )
 
     def _joints(self, ring, jumps) -> dict[str, Any]:
         """Laws of joints and bolts, with what they take of the unknowns."""
         mesh, to_nodes = self.mesh, self._to_nodes
-        law, moves = JointLaw(ring), jumps
+        # Strips are part of the concrete.
+        law, moves = JointLaw(ring, resists=self._width == 0), jumps
         if ring.joint_contact == "face":
             points, faces = face_points(ring, mesh)
             law, moves = FaceLaw(ring, points), tilted(_without_zeros(faces @ to_nodes), ring.tilts[points.joint])

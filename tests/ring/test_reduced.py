@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 import coupling
-from structure import Bolts
+from structure import Bolts, ContinuumLining
 from structure.lining import THETA
 from structure.models import lining_model
 from structure.reduced import ReducedRing
@@ -123,3 +123,19 @@ def test_joint_forces_change_with_the_displacement_as_their_tangent_says(ring):
     force, tangent, _ = small.joint_forces(x, still)
     change = small.joint_forces(x + step, still)[0] - force
     assert change == pytest.approx(tangent @ step, abs=1e-4 * np.abs(change).max())
+
+
+def test_strips_count_once_beside_bolts(ring):
+    weak = {"joint_bolts": Bolts(offset=-0.05, length=0.4, stiffness=1.0)}
+
+    def softest(changes):
+        lining = ContinuumLining(ring.model_copy(update=changes), columns=90, joint="equivalent_strip")
+        small = ReducedRing(lining, DENSITY, GRAVITY)
+        tangent = small.stiffness
+        if small.moves.size:
+            more = small.joint_forces(np.zeros(len(small.moves)), np.zeros(len(small.jumps)))[1]
+            tangent = tangent + small.moves.T @ more @ small.moves
+        return np.linalg.eigvalsh(tangent[3:, 3:])[0]
+
+    # 1e-5: 1 N/m2 beside joints of 1e8 is nothing; strips that count twice are stiffer by per cents.
+    assert softest(weak) == pytest.approx(softest({}), rel=1e-5)
