@@ -27,6 +27,9 @@ PROGRESS = {
 }
 COMPARED = {**PROGRESS, **{name: SHOWN[name] for name in (*PRESSURES, *RESPONSE) if name in SHOWN}}
 
+#: Lining model of runs that no model has answered in common.
+EACH_ITS_OWN = "each run its own"
+
 
 class SideBySide(NamedTuple):
     """Runs beside each other.
@@ -88,6 +91,10 @@ def side_by_side(runs: Sequence[str | Path], along: str = "inflow_mass", records
         other = "; let it go on, or compare along time" if along == "inflow_mass" else "; let it go on"
         raise Refused(f"run '{still}': must get beyond the initial state to be compared, it did not{other}")
     common = [model for model in read[0]["responses"] if all(model in one["responses"] for one in read)]
+    if not common and all(one["responses"] for one in read):
+        common = [EACH_ITS_OWN]
+        for one in read:
+            one["responses"] = {EACH_ITS_OWN: next(iter(one["responses"].values()))}
     at = np.linspace(0.0, min(ends), records)
     states = []
     for one in read:

@@ -123,3 +123,14 @@ def test_run_without_inflow_is_compared_along_time_only(folder, tmp_path):
     synthetic_run.write_run(tmp_path / "still.nc", times=(0.0,))
     with pytest.raises(Refused, match="must get beyond the initial state"):
         side_by_side([folder / "base", tmp_path / "still.nc"])
+
+
+def test_runs_that_no_lining_model_answered_in_common_are_compared_each_by_its_own(tmp_path):
+    for name, model in (("beams", "beam-spring"), ("solid", "continuum")):
+        (tmp_path / name).mkdir()
+        synthetic_run.write_run(tmp_path / name / "run.nc", models=(model,))
+    compared = side_by_side([tmp_path / "beams", tmp_path / "solid"])
+    rows = {row["name"]: row for row in compared.rows}
+    assert rows["soil_pressure"]["difference"] == 0.0
+    assert 0.0 < rows["displacement_radial"]["relative"] < 0.05  # sections that also shear give way more
+    assert [list(states["model"].values) for states in compared.states] == [["each run its own"]] * 2
