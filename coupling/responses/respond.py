@@ -36,7 +36,7 @@ def respond(scene: Scene, pressures: xr.Dataset, backend: str | None = None, tun
         ring = ring_of(scene, number)
     except SceneError as problem:
         raise Refused(str(problem)) from None
-    response = respond_by_name(ring, pressures, backend or moved or "beam-spring", moved)
+    response = respond_by_name(ring, pressures, backend or _usual(moved), moved)
     return with_checks(response, limits_at(scene, number, scene.limits))
 
 
@@ -45,8 +45,13 @@ def responses_on(
 ) -> Iterator[tuple[tuple[str, int | None], xr.Dataset]]:
     """Responses of all tunnels, each of its own ring: (model, tunnel as of :func:`respond`) and response."""
     for tunnel in (None, *tunnels_beside(pressures)):
-        response = respond(scene, pressures, backend, tunnel)
-        yield (response.attrs["model"], tunnel), response
+        model = backend or _usual(moved_by(scene, gate_tunnel(scene) if tunnel is None else tunnel))
+        yield (model_name(model), tunnel), respond(scene, pressures, model, tunnel)
+
+
+def _usual(moved):
+    """The lining model that answers where none is named."""
+    return moved or "beam-spring"
 
 
 def check_backend(backend: str, moved: str | None) -> None:
