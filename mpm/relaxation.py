@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 
-from mpm.fields import FIXED_X, FIXED_Y, REACTION_RECORD, values
+from mpm.fields import FIXED_X, FIXED_Y, MIRROR_X, REACTION_RECORD, values
 from mpm.laws.law import stress_kernel
 from mpm.laws.stress import Strain, Stress
 from mpm.machine.compile import kernel
@@ -110,8 +110,12 @@ def relax_nodes(first, last, heavy, force, held_force, held_liquid, mass, walls,
         velocity[i, 0] = vx + fx / m
         velocity[i, 1] = vy + fy / m
         energy += mass[i] * (velocity[i, 0] ** 2 + velocity[i, 1] ** 2)
-        unbalanced += fx * fx + fy * fy
-        total += held_force[i, 0] ** 2 + held_force[i, 1] ** 2
+        if walls.fixed[i] & MIRROR_X:  # half of a node, whose other half has the same force along the line
+            unbalanced += 2.0 * fy * fy
+            total += 2.0 * held_force[i, 1] ** 2
+        else:
+            unbalanced += fx * fx + fy * fy
+            total += held_force[i, 0] ** 2 + held_force[i, 1] ** 2
     sums[0], sums[1], sums[2] = energy, unbalanced, total
 
 
