@@ -31,7 +31,7 @@ def even_loads(theta: np.ndarray, by_pressure, by_shear, rigid: np.ndarray) -> t
     by_pressure, by_shear : (n_unknowns, n_theta) sparse
         Loads per Pa at `theta`.
     rigid : (3, n_unknowns) float64
-        As of :class:`structure.ring_forces.RingParts`.
+        As of :class:`structure.nodal_forces.RingParts`.
 
     Returns
     -------

@@ -1,6 +1,6 @@
 """What all lining models of finite elements share: loads, equilibrium, balances, movements and the response.
 
-A model makes matrices of its ring once (:class:`structure.ring_forces.RingParts`), says how forces and displacements
+A model makes matrices of its ring once (:class:`structure.nodal_forces.RingParts`), says how forces and displacements
 are read from its unknowns (:class:`Readings`) and what tractions on its outer face do; the rest is here.
 """
 
@@ -17,10 +17,10 @@ from threadpoolctl import threadpool_limits
 from structure.balance import borne, even_loads, without_unborne
 from structure.lining import THETA, LiningFailure, LiningModel, origin, response_dataset
 from structure.newton import NoEquilibrium, RingEquilibrium
+from structure.nodal_forces import RingForces, RingParts
 from structure.pressures import check_pressures
 from structure.response import BOLT_FORCE, FORCES, RESPONSE, described
 from structure.ring import Ring
-from structure.ring_forces import RingForces, RingParts
 from structure.staggered import coupling_springs, paired
 
 #: Both sides of an angle [rad]: at a joint the mean of the two is given.

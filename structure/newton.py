@@ -6,8 +6,8 @@ import numpy as np
 from scipy import sparse
 
 from structure.banded import BandedTangent, Mechanism, softest_motion
+from structure.nodal_forces import RingForces, RingParts, springs_at
 from structure.ring import Ring
-from structure.ring_forces import RingForces, RingParts, springs_at
 
 #: Out-of-balance force on an unknown over the sum of all loads at which Newton stops.
 RESIDUAL_TOLERANCE = 1e-11

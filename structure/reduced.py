@@ -18,8 +18,8 @@ from structure.discrete import DiscreteLining
 from structure.inputs import InputError
 from structure.lining import THETA
 from structure.newton import NoEquilibrium
+from structure.nodal_forces import springs_at
 from structure.ring import Ring
-from structure.ring_forces import springs_at
 
 #: Angles of the outer face at which displacements are kept; linear in between.
 FACE = np.radians(np.arange(0, 360, 0.5))

@@ -7,8 +7,8 @@ from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from structure.bolts import BoltLaw
+from structure.nodal_forces import RingParts, springs_at
 from structure.ring import Neighbour
-from structure.ring_forces import RingParts, springs_at
 
 
 def coupling_springs(neighbour: Neighbour, centre_radius: float, lined: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

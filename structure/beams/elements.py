@@ -1,4 +1,4 @@
-"""Straight Timoshenko beams: stiffness and section forces of elements, joints between them, loads on their nodes."""
+"""Straight Timoshenko beams: stiffness of elements, joints between them, loads on their nodes."""
 
 from __future__ import annotations
 
@@ -60,12 +60,6 @@ def segment_stiffness(ring: Ring, mesh: RingMesh) -> sparse.csr_array:
     index = np.hstack([mesh.unknowns(mesh.first), mesh.unknowns(mesh.second)])
     place, size = (np.repeat(index, 6, axis=1).ravel(), np.tile(index, (1, 6)).ravel()), 3 * mesh.n_nodes
     return sparse.coo_array((blocks.ravel(), place), shape=(size, size)).tocsr()
-
-
-def section_operators(ring: Ring, mesh: RingMesh) -> list[sparse.csr_array]:
-    """N, Q and M at the middles of the elements, where the chord is parallel to the circle, (n_elements, 3 n_nodes)."""
-    axial, shear, first, second = np.moveaxis(element_matrices(ring, mesh)[0], 1, 0)
-    return [mesh.gathered(part, mesh.first, mesh.second) for part in (axial, shear, (first + second) / 2)]
 
 
 def joint_jumps(mesh: RingMesh) -> sparse.csr_array:

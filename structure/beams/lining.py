@@ -12,18 +12,18 @@ from structure.banded import folded
 from structure.beams.elements import (
     joint_jumps,
     nodal_masses,
-    section_operators,
     segment_stiffness,
     self_weight,
     traction_operator,
 )
-from structure.beams.mesh import RingMesh, displacements_at, forces_at
+from structure.beams.mesh import RingMesh
+from structure.beams.sections import displacements_at, section_forces
 from structure.bolts import bolt_law
 from structure.discrete import SIDES, DiscreteLining, Readings
 from structure.joint_laws import FaceLaw, FacePoints, JointLaw
 from structure.lining import THETA
+from structure.nodal_forces import RingParts, tilted, whole_movements
 from structure.ring import Ring, alone, check_ring
-from structure.ring_forces import RingParts, tilted, whole_movements
 
 
 class BeamSpringLining(DiscreteLining):
@@ -104,11 +104,10 @@ def _joints(ring: Ring, jumps: sparse.csr_array) -> dict[str, Any]:
 
 def _readings(ring: Ring, mesh: RingMesh) -> Readings:
     theta = np.radians(THETA)
-    at_theta = forces_at(mesh, theta)
     sides = [displacements_at(mesh, theta + side, ring.centre_radius) for side in SIDES]
     movement = tuple((one + other) / 2 for one, other in zip(*sides, strict=True))
     return Readings(
-        forces=tuple((at_theta @ part).tocsr() for part in section_operators(ring, mesh)),
+        forces=section_forces(ring, mesh, theta),
         movement=movement,
         quarters=movement[0][:: len(THETA) // 4],
         spring_angle=mesh.node_angle,

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from structure.arcs import periodic_shares
 from structure.ring import Ring
 
 
@@ -72,36 +71,3 @@ def _elements_per_segment(ring: Ring) -> np.ndarray:
     left = ring.n_elements - counts.sum()
     counts[np.argsort(counts - share, kind="stable")[:left]] += 1
     return counts
-
-
-def forces_at(mesh: RingMesh, theta: np.ndarray) -> sparse.csr_array:
-    """Section forces at angles theta [rad] from those at the middles of the elements, (n_theta, n_elements).
-
-    Linear between the middles, also across a joint, which passes on all that reaches it.
-    """
-    middle = mesh.mid_angle % (2 * np.pi)
-    order = np.argsort(middle)
-    samples, shares = periodic_shares(middle[order], theta)
-    place = (np.tile(np.arange(len(theta)), 2), order[np.concatenate(samples)])
-    return sparse.coo_array((np.concatenate(shares), place), shape=(len(theta), len(middle))).tocsr()
-
-
-def displacements_at(
-    mesh: RingMesh, theta: np.ndarray, centre_radius: float
-) -> tuple[sparse.csr_array, sparse.csr_array]:
-    """Radial and tangential displacement of the centre line at theta [rad], (n_theta, 3 n_nodes) each.
-
-    Straight between the two nodes of an element; the section's rotation moves the circle against the chord, so that a
-    turn of the whole ring is one of the circle. On a joint one of its sides is taken.
-    """
-    along = (theta[:, None] - mesh.node_angle[mesh.first]) % (2 * np.pi)
-    element = np.argmax(along <= mesh.span, axis=1)
-    share = along[np.arange(len(theta)), element] / mesh.span[element]
-    nodes = np.stack([mesh.first[element], mesh.second[element]], axis=1)
-    of_node, lean = np.stack([1 - share, share], axis=1), theta[:, None] - mesh.node_angle[nodes]
-    cosine, sine = of_node * np.cos(lean), of_node * np.sin(lean)
-    off = -sine.sum(axis=1), 1 - cosine.sum(axis=1)
-    return tuple(
-        mesh.gathered(np.stack([*parts, centre_radius * far[:, None] * of_node], axis=2).reshape(-1, 6), *nodes.T)
-        for parts, far in zip(((cosine, sine), (-sine, cosine)), off, strict=True)
-    )

@@ -19,10 +19,10 @@ from structure.continuum.sections import section_displacements, section_forces
 from structure.discrete import SIDES, DiscreteLining, Readings, one_thread
 from structure.joint_laws import FaceLaw, JointLaw
 from structure.lining import THETA, origin
+from structure.nodal_forces import RingParts, tilted, whole_movements
 from structure.pressures import check_pressures
 from structure.response import FORCES, described
 from structure.ring import Ring, alone, check_ring
-from structure.ring_forces import RingParts, tilted, whole_movements
 
 #: Of the stress dataset, name: (which stress, its sign).
 STRESSES = {

@@ -11,7 +11,7 @@ import pytest
 from rings import ground, pressures, ring
 
 from structure import BeamSpringLining
-from structure.beams.mesh import forces_at
+from structure.beams.sections import forces_at
 from structure.springs import soil_springs
 
 PROGRAM = Path(__file__).with_name("opensees_ring.py")

@@ -13,10 +13,10 @@ from verification.monitor import Monitor, follow
 from verification.pages import templated_page
 from verification.stability.amplification import STABLE as NO_GROWTH
 from verification.stability.amplification import Amplification, Column
-from verification.stability.cases import Case, cases
 from verification.stability.linear import critical_map
 from verification.stability.report import families, write
-from verification.stability.trials import block_scene, box_of
+from verification.stability.small_scenes import block_scene, box_of
+from verification.stability.trials import Case, cases
 from verification.stability.verdicts import BUG, STABLE, judge, judge_apart
 
 pytestmark = pytest.mark.slow

@@ -6,9 +6,9 @@ import numpy as np
 
 from mpm.scene import Numerics
 from verification.pages import made_by, provenance, rendered, templated_page, write_data
-from verification.stability.cases import chosen
 from verification.stability.linear import WAYS, critical_map
 from verification.stability.map_figure import draw_map
+from verification.stability.trials import chosen
 from verification.stability.verdicts import BUG, judge_apart
 
 ALLOWED = (0.7, 1.0)  # predicted over actual

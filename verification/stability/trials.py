@@ -1,187 +1,160 @@
-"""Small scenes that extremes are tried on: a block in a closed box, a lump that flies, a coarse tunnel with a gate."""
+"""What `gush stability` tries: runs at the edge of what a scene can ask for."""
 
-import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
 
-import numpy as np
-
-from mpm.k0_procedure import initial_stress
-from mpm.mesh.build import build_mesh
-from mpm.scene import Scene
-from mpm.solver import Solver
-from verification.boxes import (
-    STRESS,
-    box_mesh,
-    box_scene,
-    box_tables,
-    clear_stress,
-    place,
-    put,
-    set_porosity,
-    state,
-)
-from verification.monitor import Monitor, follow
-
-REST = 0.01  # [m/s]: ground that has moved for a second at this speed has not moved by an element
-
-SOIL = {
-    "model": "mohr-coulomb", "youngs_modulus": 4e7, "poissons_ratio": 0.3, "cohesion": 0.0, "friction_angle": 25.0,
-    "dilatancy_angle": 0.0, "tensile_strength": 0.0, "porosity": 0.45, "loose_porosity": 0.55, "grain_density": 2650.0,
-    "hydraulic_conductivity": 1e-4, "k0": 0.577,
-}  # fmt: skip
+from coupling.refused import SceneError
+from verification.stability.small_scenes import collapse, filled_tunnel, gate, jet, one_point, slurry
 
 
-def block_scene(size, **settings):
-    """Scene of a box of 12 by 8 cells of the given size [m]; settings as of `verification.boxes.box_scene`."""
-    return box_scene("soil", size, 12 * size, 8 * size, **SOIL | {"bulk_modulus": 8e7} | settings)
+@dataclass(frozen=True)
+class Case:
+    """One extreme.
+
+    name : str;  title : str, what is extreme about it;  run : callable, run(**settings) -> (faults, measures), of
+    `verification.monitor.Monitor`;  settings : dict;  representative : bool, one of those that the tests run.
+    """
+
+    name: str
+    title: str
+    run: Callable[..., tuple[list[str], dict[str, float]]]
+    settings: dict[str, Any] = field(default_factory=dict)
+    representative: bool = False
 
 
-def box_of(size, left, right, bottom, top):
-    """Closed box of 12 by 8 cells, ground surface y = 0; filled between the given lines, in cells from lower left."""
-
-    def filled(cx, cy):
-        column, row = cx / size, cy / size + 8
-        return (column > left) & (column < right) & (row > bottom) & (row < top)
-
-    return box_mesh(np.arange(13) * size, (np.arange(9) - 8) * size, filled)
+class CaseUnknown(SceneError):
+    """A name that is no case of `gush stability`."""
 
 
-def block(size, settings, left=0, right=6, bottom=0, top=6):
-    """A solver of such a box."""
-    return Solver(block_scene(size, **settings), box_of(size, left, right, bottom, top), threads=1)
+def chosen(names):
+    """Cases of these names; `*` stands for any ending, no name for all.
+
+    Raises CaseUnknown.
+    """
+    known, found = cases(), []
+    for name in names or known:
+        some = [c for k, c in known.items() if k == name or (name.endswith("*") and k.startswith(name[:-1]))]
+        if not some:
+            raise CaseUnknown(f"case '{name}': must be one of {', '.join(known)}; or a beginning of one followed by *")
+        found += [case for case in some if case not in found]
+    return found
 
 
-def collapse(size=0.1, seconds=0.5, positions="layout", **settings):
-    """A block, six cells wide and high, with K0 and hydrostatic stress, loses its support on one side."""
-    solver = block(size, settings)
-    _unload(solver, 2 * size)  # the surface of the block lies below that of the scene: stresses as from its own
-    place(solver, positions, seed=1)
-    monitor = Monitor(solver)
-    faults, measures = follow(monitor, seconds)
-    if solver.scene.gravity == 0.0 and monitor.most_speed > 0.0:
-        faults.append(f"moves at {monitor.most_speed:.2g} m/s without any load")
-    return faults, measures
+@cache
+def cases():
+    """All cases by name: dict of str to `Case`."""
+    listed = {}
+    for case in (*_boxes(), *_tunnels(), *_motions()):
+        if case.name in listed:
+            raise ValueError(f"stability case '{case.name}' is listed twice")
+        listed[case.name] = case
+    return listed
 
 
-def slurry(size=0.1, seconds=0.5, **settings):
-    """The same block with its grains apart (porosity 0.7): a heavy liquid."""
-    solver = block(size, settings)
-    _unload(solver, 2 * size)
-    set_porosity(solver, 0.7)
-    put(solver, **dict.fromkeys(STRESS, 0.0))
-    return follow(Monitor(solver), seconds)
+def _boxes():
+    """Material numbers, on the collapse of a block in a closed box."""
+    chosen = {"K_w=2.2e+09", "k=1e-12", "k=1e+01", "E=1e+05", "phi=50,psi=50", "dry"}
+
+    def case(name, title, **settings):
+        return Case(name, title, collapse, settings, name in chosen)
+
+    for value in (1e6, 8e7, 2.2e9, 1e10, 1e11, 1e12):
+        yield case(f"K_w={value:.2g}", "bulk modulus of the water [Pa]", bulk_modulus=value)
+    for value in [*(10.0**k for k in range(-12, 2)), 0.0, 100.0]:
+        yield case(f"k={value:.0e}", "hydraulic conductivity [m/s]", hydraulic_conductivity=value)
+    for value in (0.0, 10.0, 30.0, 50.0, 59.0, 60.0):
+        yield case(f"phi={value:g}", "friction angle [degree], c = 0.5 kPa", friction_angle=value, cohesion=5e2)
+    for value in (0.0, 1e3, 1e5, 1e6):
+        yield case(f"c={value:g}", "cohesion [Pa]", cohesion=value)
+    for value in (2.0, 5.0, 15.0, 30.0):
+        yield case(f"psi={value:g}", "dilatancy angle [degree], phi = 25", dilatancy_angle=value)
+    for value in (10.0, 25.0):
+        title = "the same, stress not ahead"
+        yield case(f"psi={value:g},damping=0", title, dilatancy_angle=value, stress_damping=0.0)
+    yield case("phi=0,c=0", "no strength at all", friction_angle=0.0, cohesion=0.0)
+    yield case("phi=50,psi=10", "dilatant", friction_angle=50.0, dilatancy_angle=10.0)
+    yield case("phi=50,psi=50", "associated flow at 50 degrees", friction_angle=50.0, dilatancy_angle=50.0)
+    yield case("tension=1e5", "tensile strength beyond the apex", tensile_strength=1e5)
+    for value in [*(10.0**k for k in range(5, 11)), 1e3]:
+        yield case(f"E={value:.0e}", "Young's modulus [Pa]", youngs_modulus=value)
+    for value in (0.0, 0.45, 0.49, 0.499, 0.5):
+        yield case(f"nu={value:g}", "Poisson's ratio [-]", poissons_ratio=value)
+    for value in (0.05, 0.0501, 0.2, 0.7, 0.89, 0.9):
+        loose = min(value + 0.1, 0.9)
+        yield case(f"n={value:g}", "porosity [-]", porosity=value, loose_porosity=loose)
+    yield case("dry", "no water", bulk_modulus=None)
+    yield case("undrained", "water moves with the grains", drainage="undrained")
+    yield case("undrained,K_w=1e+11", "the same, stiff water", drainage="undrained", bulk_modulus=1e11)
+    yield case("dry,E=1e+10", "no water, stiff", bulk_modulus=None, youngs_modulus=1e10)
+    yield case("no gravity", "gravity 0: nothing must move", gravity=0.0)
+    yield case("gravity=100", "centrifuge, 10 g", gravity=100.0)
+    yield case("table below", "water table 1 m below the surface", table_depth=1.0)
+    for value in (1, 2, 3, 4, 6, 9, 12, 16, 25):
+        yield case(f"points={value}", "points per element", points=value)
+    for place in ("vertices", "edges", "random"):
+        for points in (1, 3):
+            yield case(f"{place},{points}", "points exactly there at the start", points=points, positions=place)
+    yield case("courant=1", "the critical step itself", courant=1.0)
+    yield case("courant=1,vertices", "the same, points on vertices", courant=1.0, positions="vertices")
+    yield case("courant=0.01", "a hundredth of it", courant=0.01, seconds=0.05)
+    yield case("filter=0", "no pressure filter", pressure_filter=0.0)
+    yield case("filter=1", "full pressure filter", pressure_filter=1.0)
+    yield case("pic=0", "pure FLIP", pic_rate=0.0)
+    yield case("pic=1e6", "pure PIC", pic_rate=1e6)
+    yield case("damping=0", "stress not ahead", stress_damping=0.0)
+    yield case("damping=2", "stress ahead by two steps", stress_damping=2.0)
+    yield case("E=1e+10,K_w=1e+06", "stiff skeleton, soft water", youngs_modulus=1e10, bulk_modulus=1e6)
+    yield case("E=1e+05,K_w=1e+11", "soft skeleton, stiff water", youngs_modulus=1e5, bulk_modulus=1e11)
+    yield case("size=1mm", "elements of 1 mm", size=1e-3, seconds=0.02)
+    yield case("size=10m", "elements of 10 m", size=10.0, seconds=10.0)
 
 
-def jet(size=0.1, speed=30.0, seconds=0.3, **settings):
-    """A lump of three by three cells flies at a wall, nine cells away."""
-    solver = block(size, settings, right=3, bottom=3)
-    clear_stress(solver)
-    put(solver, velocity_solid_x=speed)
-    if solver.scene.water is not None:
-        put(solver, velocity_liquid_x=speed)
-    return follow(Monitor(solver), seconds)
+def _tunnels():
+    """Geometry and flow, on a coarse tunnel with a gate."""
+
+    def case(name, title, run=gate, representative=False, **settings):
+        return Case(name, title, run, settings, representative)
+
+    yield case("gate", "the coarse tunnel as it is")
+    yield case("K_w=2.2e9,gate", "real water", bulk_modulus=2.2e9, seconds=0.1)
+    yield case("k=1e-12,gate", "clay", hydraulic_conductivity=1e-12)
+    yield case("k=10,gate", "open gravel", hydraulic_conductivity=10.0)
+    yield case("E=1e5,gate", "mud", youngs_modulus=1e5)
+    yield case("E=1e10,gate", "rock", youngs_modulus=1e10, seconds=0.05)
+    yield case("c=1e6,gate", "cemented: nothing comes in", cohesion=1e6, model="mohr-coulomb")
+    yield case("phi=50,psi=10,gate", "dilatant", friction_angle=50.0, dilatancy_angle=10.0)
+    yield case("phi=50,psi=50,gate", "associated", friction_angle=50.0, dilatancy_angle=50.0)
+    yield case("dry,gate", "no water", water=False)
+    yield case("undrained,gate", "water moves with the grains", drainage="undrained")
+    yield case("no gravity,gate", "gravity 0", gravity=0.0)
+    for ratio in (0.3, 1.0, 5.0, 20.0):
+        yield case(f"cover={ratio:g}D", "cover over the outer diameter", cover=ratio, representative=ratio == 0.3)
+    yield case("cover=0", "no cover", cover=0.0)
+    for width in (0.02, 0.05, 1.0, 2.0):
+        yield case(f"channel={width:g}m", "width of the gate", width=width)
+    for angle in (0.0, 45.0, 180.0):
+        yield case(f"gate at {angle:g}", "angle of the gate [degree]", angle=angle)
+    yield case("sink", "material taken out behind the gate", interior="sink")
+    yield case("full", "tunnel filled to the crown, gate open: rest", filled_tunnel, True)
+    yield case(
+        "filling", "a small tunnel until nothing more fits", gate, diameter=1.0, width=0.2, cover=3.0, seconds=3.0
+    )
+    yield case("closed again", "gate open for 0.1 s, closed, 0.1 s", representative=True, close_at=0.1, seconds=0.2)
+    yield case("reopened", "open, closed, open", close_at=0.05, reopen_at=0.1, seconds=0.2)
+    yield case("ten times", "ten times the run", seconds=3.0)
 
 
-def one_point(size=0.1, seconds=2.0, **settings):
-    """One point in an otherwise empty box: it falls, lands and lies still."""
-    scene, mesh = block_scene(size, points=1, **settings), box_of(size, 5, 6, 4, 5)
-    mesh.region[np.flatnonzero(mesh.region == 0)[1:]] = 3
-    solver = Solver(scene, mesh, threads=1)
-    clear_stress(solver)
-    heights, monitor = [state(solver, "y")[0]], Monitor(solver)
-    looks = [(t, lambda: heights.append(state(solver, "y")[0])) for t in np.linspace(0, seconds, 200, endpoint=False)]
-    faults, measures = follow(monitor, seconds, events=looks)
-    fallen = float(heights[0] - min(heights))
-    if fallen < 3 * size:
-        faults.append(f"fell {fallen:.3g} m of {4 * size:.3g} m")
-    landing = math.sqrt(2 * scene.gravity * 4 * size)
-    if monitor.most_speed > 1.1 * landing:
-        faults.append(f"reached {monitor.most_speed:.3g} m/s, free fall gives {landing:.3g} m/s")
-    return faults, measures | {"fallen": fallen}
-
-
-def coarse_tunnel(
-    diameter=6.6, cover=1.0, width=0.2, angle=90.0, water=True, gravity=9.81, bulk_modulus=8e7, interior="resolved",
-    drainage="two-phase", **soil,
-):  # fmt: skip
-    """Scene of one tunnel with a gate on the coarsest mesh that makes sense; `cover` in diameters."""
-    modulus = bulk_modulus if water else None
-    return Scene.model_validate(box_tables(
-        "soil", 0.45 * diameter, 5 * diameter, (cover + 2.5) * diameter, gravity,
-        **SOIL | {"bulk_modulus": modulus, "drainage": drainage} | soil,
-    ) | {
-        "interior": interior,
-        "tunnels": [{
-            "x": 0.0, "cover": cover * diameter, "outer_diameter": diameter, "inner_diameter": 0.9 * diameter,
-            "friction_coefficient": 0.2,
-        }],
-        "gate": {"angle": angle, "width": width},
-        "discretisation": {
-            "element_size": 0.45 * diameter, "element_size_lining": 0.12 * diameter,
-            "element_size_interior": 0.08 * diameter, "elements_across_gate": 2, "gate_radius": 0.1 * diameter,
-            "size_growth": 0.3,
-        },
-    })  # fmt: skip
-
-
-def gate(seconds=0.3, close_at=None, reopen_at=None, **settings):
-    """Open the gate of the coarse tunnel, perhaps close and reopen it."""
-    scene = coarse_tunnel(**settings)
-    solver = Solver(scene, build_mesh(scene), threads=1)
-    steps, residual = solver.relax()
-    if residual > scene.numerics.relaxation_tolerance:
-        return [f"the initial state did not settle: residual {residual:.2g} after {steps} steps"], {}
-    solver.open_gate()
-    monitor = Monitor(solver)
-    events = [(time, call) for time, call in ((close_at, solver.close_gate), (reopen_at, solver.open_gate)) if time]
-    faults, measures = follow(monitor, seconds, events=events)
-    return faults + _inflow_faults(monitor, close_at, reopen_at), measures
-
-
-def filled_tunnel(seconds=0.3, **settings):
-    """Soil everywhere, inside the tunnel too, with isotropic stress of level ground: the open gate changes nothing."""
-    scene = coarse_tunnel(k0=1.0, **settings)  # any other stress slips along the lining's friction
-    mesh = build_mesh(scene)
-    mesh.region[mesh.nodes[mesh.elements].mean(axis=1)[:, 1] < 0.0] = 0  # all but what lies above the ground
-    solver = Solver(scene, mesh, threads=1)
-    solver.open_gate()
-    monitor = Monitor(solver)
-    faults, measures = follow(monitor, seconds)
-    moved = measures["inflow_mass"] / monitor.inflow[0]
-    if abs(moved) > 1e-3:
-        faults.append(f"{moved:.2%} of the content came in through the gate of a full tunnel")
-    # the wall bears the corners of the gate in one direction only, so they give way at first
-    last = math.sqrt(2 * monitor.kinetic / float(np.sum(state(solver, "grain_mass"))))
-    if last > REST:
-        faults.append(f"does not come to rest: {last:.2g} m/s")
-    return faults, measures | {"last_speed": last}
-
-
-def _inflow_faults(monitor, close_at, reopen_at):
-    """Inflow that goes backwards, or is faster than free discharge under the whole head through the gate."""
-    scene, faults = monitor.solver.scene, []
-    time, mass = np.array(monitor.times), np.array(monitor.inflow)
-    tunnel, soil = scene.tunnels[0], scene.soils[0]
-    head = tunnel.axis_depth - tunnel.outer_radius * math.cos(math.radians(scene.gate.angle))
-    density = (1 - soil.porosity) * soil.grain_density
-    total = density + soil.porosity * (scene.water.density if scene.water else 0.0)
-    light = scene.water.density if scene.water else soil.grain_density
-    speed = math.sqrt(2 * scene.gravity * head * total / light)
-    most = density * scene.gate.width * speed * time[-1]
-    if mass[-1] > most:
-        faults.append(f"inflow {mass[-1]:.4g} kg/m, free discharge under the total head gives {most:.4g} kg/m")
-    if mass[-1] < 0.0:
-        faults.append("negative inflow")
-    if close_at is not None:
-        shut = (time > close_at + 0.02) & (time < (reopen_at or math.inf))
-        late = np.ptp(mass[shut]) if shut.any() else 0.0
-        in_channel = density * scene.gate.width * (tunnel.outer_radius - tunnel.inner_radius)
-        if late > in_channel:
-            faults.append(f"{late:.3g} kg/m came in through a closed gate, its channel holds {in_channel:.3g} kg/m")
-    return faults
-
-
-def _unload(solver, depth):
-    """Move the initial stress down by `depth` [m]: that of a surface at y = -depth."""
-    vertical, pressure = initial_stress(solver.scene, np.maximum(-state(solver, "y") - depth, 0.0))
-    lateral = -solver.scene.soils[0].lateral_pressure_coefficient(vertical) * vertical
-    put(solver, pore_pressure=pressure, stress_yy=-vertical, stress_xx=lateral, stress_zz=lateral)
+def _motions():
+    """Fast and sparse material."""
+    yield Case("one point", "one point alone falls, lands, rests", one_point, {}, True)
+    yield Case("one point dry", "the same without water", one_point, {"bulk_modulus": None})
+    yield Case("jet 30 m/s", "a lump of soil and water at 30 m/s against a wall", jet, {}, True)
+    yield Case("jet 30 m/s,K_w=2.2e9", "with real water", jet, {"bulk_modulus": 2.2e9, "seconds": 0.1})
+    yield Case("jet 30 m/s,dry", "without water", jet, {"bulk_modulus": None})
+    yield Case("jet 30 m/s,undrained", "water moves with the grains", jet, {"drainage": "undrained"})
+    yield Case("jet 300 m/s", "near the wave speed", jet, {"speed": 300.0, "seconds": 0.05})
+    yield Case("water only", "grains do not touch: a dam of slurry breaks", slurry, {}, True)
+    yield Case("water only,k=10", "and hardly hold the water", slurry, {"hydraulic_conductivity": 10.0})
+    yield Case("collapse,ten times", "a block's collapse for ten times as long", collapse, {"seconds": 5.0})
