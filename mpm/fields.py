@@ -9,6 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+#: Angles around a lining at which its motion and its forces are given [degree].
+WHOLE_DEGREES = np.arange(360.0)
+
 
 class Field(NamedTuple):
     """One number that is carried."""

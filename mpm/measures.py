@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mpm.fields import numbers
+from mpm.fields import WHOLE_DEGREES, numbers
 from mpm.mesh.half import with_mirrored_points
 from mpm.points import mass_inside
 
@@ -10,9 +10,6 @@ from mpm.points import mass_inside
 FLOWS, DISTURBED = 0.05, 0.01
 #: What sums of a cell may be off by, over its area, and rotated stresses, over stress and shear modulus [-].
 ROUNDING = 1e-9
-
-#: Where the motion of a lining is given, and its forces.
-WHOLE_DEGREES = np.arange(360.0)
 
 #: Acceleration of a grain at the gate over gravity: what presses 20 m below ground, over a gate's width of 0.2 m.
 STEEPEST = 100.0

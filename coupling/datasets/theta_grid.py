@@ -3,10 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from mpm.fields import WHOLE_DEGREES
+
 
 def cell_centres() -> NDArray[np.float64]:
     """Centres of the 360 one-degree cells: 0, 1, .. 359 [degree]."""
-    return np.arange(360.0)
+    return WHOLE_DEGREES.copy()
 
 
 def cell_bounds() -> NDArray[np.float64]:

@@ -297,9 +297,10 @@ def test_response_of_a_jointed_lining_at_rest_is_that_of_the_ring_alone(tmp_path
     own = read_response(tmp_path / "run", "beam-spring").isel(time=[0])
     alone = scene.ring.model_copy(update={"ground": None, "support": "invert"})
     found = BeamSpringLining(alone).respond(read_pressures(tmp_path / "run").isel(time=[0]))
-    # the ring of few coordinates knows its pressures by eight harmonics; near the invert the clamp takes what is left
+    # the ring of few coordinates knows its pressures by eight harmonics: measured 0.2, 1.5, 8.5 %; near the invert the
+    # clamp takes what is left
     away = np.abs(found["theta"].values - 180) > 20
-    for name, most in (("axial_force", 0.01), ("bending_moment", 0.05)):
+    for name, most in (("axial_force", 0.005), ("bending_moment", 0.03), ("shear_force", 0.12)):
         expected = found[name].values[0, away]
         assert own[name].values[0, away] == pytest.approx(expected, abs=most * np.abs(expected).max())
 
